@@ -192,11 +192,10 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
     )
     torch = needs.OF_TORCH if any(map(is_learned, study.policies)) else 0.0
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
-    missions = study.episodes * len(study.pairs)
     return Needs(
-        memory=min(num_jobs, len(batches)) * largest + 50.0 * ages + 1000.0 * missions,
+        memory=min(num_jobs, len(batches)) * largest + 50.0 * ages + 1000.0 * study.num_missions,
         addresses=needs.ADDRESSES + torch,
-        file=5.0 * ages + 300.0 * missions,
+        file=5.0 * ages + 300.0 * study.num_missions,
     )
 
 

@@ -104,8 +104,8 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
         is_memory = isinstance(error, MemoryError)
         ending = "Out of memory" if is_memory else "Interrupted"
         hint = "the same command with --resume continues" if kept else "nothing was kept"
-        flown, total = flying.num_flown(study, costs), study.episodes * len(study.pairs)
-        console.print(f"{ending} after {flown} of {total} missions; {hint}.")
+        flown = flying.num_flown(study, costs)
+        console.print(f"{ending} after {flown} of {study.num_missions} missions; {hint}.")
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
         evaluated = summarise(study, costs, header)

@@ -2,7 +2,6 @@
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -42,25 +41,26 @@ class Batch:
         return make_policy(self.policy, self.mission, self.probability, **how)
 
 
-@dataclass(frozen=True, kw_only=True)
+@dataclass(frozen=True, kw_only=True, eq=False)
 class BatchCosts:
-    """The costs of a batch: one number per mission, in the order of the seeds."""
+    """The costs of missions, in the order of their seeds; nan is what does not exist."""
 
-    aoi: list[float]  # Eq. 10, mean over windows [windows]
-    aoi_steady: list[float]  # as above, over the second half
-    aoi_floor: list[float | None]  # the connectivity floor, as above; None: own channel
-    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
-    hops: list[float]  # depth of the parent trees, mean over windows
-    task_cost: list[float | None]  # mean over windows; None if the controller has none
-    task_cost_last: list[float | None]  # as above, after the last window
-    complete_window: list[int | None]  # everyone had first heard of everyone
-    packets_sent: list[int]  # requests or broadcasts
-    packets_transmitted: list[int]  # all that were on the air, responses too
-    packets_delivered: list[int | None]  # requests that their addressee decoded; None: broadcasts
-    packets_heard: list[int | None]  # broadcasts that somebody decoded; None: addressed packets
-    packets_receptions: list[int | None]  # times that a robot decoded a broadcast; None: as above
-    ages: list[int]  # of all missions: how often a robot's knowledge of another had each age,
-    # in slots, from 0 to the mission's length
+    aoi: Float[np.ndarray, "B"]  # Eq. 10, mean over windows [windows]
+    aoi_steady: Float[np.ndarray, "B"]  # as above, over the second half
+    aoi_floor: Float[np.ndarray, "B"]  # the connectivity floor, as above; nan: custom channel
+    velocity_variance: Float[np.ndarray, "B"]  # Eq. 17, mean over windows [m²/s²]
+    hops: Float[np.ndarray, "B"]  # depth of the parent trees, mean over windows
+    task_cost: Float[np.ndarray, "B"]  # mean over windows; nan if the controller has none
+    task_cost_last: Float[np.ndarray, "B"]  # as above, after the last window
+    complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone; nan: never
+    packets_sent: Float[np.ndarray, "B"]  # requests or broadcasts
+    packets_transmitted: Float[np.ndarray, "B"]  # all that were on the air, responses too
+    packets_delivered: Float[np.ndarray, "B"]  # requests that their addressee decoded
+    packets_heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
+    packets_receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
+    # Over all missions: how often a robot's knowledge of another had each age, in slots, from 0 to
+    # the mission's length.
+    ages: Int[np.ndarray, "bins"]
 
 
 @one_line_each()  # what is raised loses its places on the way between processes
@@ -91,8 +91,9 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
     # The floor is by the mission's own range, which other channels need not have.
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)
-    complete, missing = np.full(shape[0], np.inf), np.full(shape[0], np.nan)
-    sums, task_cost = dict[str, np.ndarray](), missing
+    missing = np.full(shape[0], np.nan)
+    complete = task_cost = missing
+    sums = dict[str, np.ndarray]()
     ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
     for window in flown:
         costs, states, now = window.costs, swarm.states, swarm.now
@@ -113,24 +114,15 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
         measured |= {f"packets_{name}": getattr(costs.packets, name) for name in TOTALS}
         for name, values in measured.items():
             sums[name] = sums.get(name, 0.0) + values
-        complete = np.minimum(complete, np.where(costs.is_complete, now, np.inf))
+        complete = np.fmin(complete, np.where(costs.is_complete, now, np.nan))
         count_ages(swarm.buffers.timestamp, now, ages, is_on)
-    known: dict[str, Any] = {}
+    found = {"task_cost_last": task_cost, "complete_window": complete}
     for name, total in sums.items():
         windows = num_steady if name == "aoi_steady" else num_windows
-        is_count = name.startswith("packets_")
-        known[name] = _known(total, int) if is_count else _known(total / windows, float)
-    return BatchCosts(
-        **known,
-        task_cost_last=_known(task_cost, float),
-        complete_window=_known(complete, int),
-        ages=ages.tolist(),
-    )
-
-
-def _known(costs: Float[np.ndarray, "B"], kind: type) -> list[Any]:
-    # None is what never happened, or does not apply.
-    return [kind(cost) if np.isfinite(cost) else None for cost in costs]
+        found[name] = total if name.startswith("packets_") else total / windows
+    # A controller's cost may be infinite, which has no mean over missions.
+    finite = {name: np.where(np.isfinite(each), each, np.nan) for name, each in found.items()}
+    return BatchCosts(**finite, ages=ages)
 
 
 @compiled()

@@ -1,31 +1,31 @@
 """The flights of a study: in several processes, kept one by one, so that a study can be resumed.
 
 The progress file holds whole lines, each a digest and JSON: first what the batches depend on, then
-one batch a line. A line's digest is of the first line's JSON and its own, so it shows a line of
-another evaluation as well as damage, and what passes needs no other check. JSON gives floats back
-as they were, so a resumed evaluation ends in the same files.
+one batch a line, its index and its costs. A line's digest is of the first line's JSON and its own,
+so it shows a line of another evaluation as well as damage, and what passes needs no other check.
+JSON gives floats back as they were, so a resumed evaluation ends in the same files.
 """
 
 import hashlib
-import json
 import os
 import signal
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import closing, contextmanager
-from dataclasses import asdict, dataclass
 from multiprocessing import get_context, resource_tracker
 from pathlib import Path
 from typing import Any, TypeVar
 
+import msgspec
+import numpy as np
 from rich.console import Console
 
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
 from swarm_mj.evaluation.study import Study
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
 from swarm_mj.system.processes import guard
-from swarm_mj.system.reading import read_file, read_json
+from swarm_mj.system.reading import read_file
 from swarm_mj.system.terminal import WorkBar
 from swarm_mj.system.writing import append_bytes, write_bytes
 
@@ -64,17 +64,24 @@ def fly_study(
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
-    total, done = study.episodes * len(study.pairs), num_flown(study, costs)
-    bar = WorkBar("Flying", total, "missions", completed=done, console=console, after_s=after_s)
+    bar = WorkBar(
+        "Flying",
+        study.num_missions,
+        "missions",
+        completed=num_flown(study, costs),
+        console=console,
+        after_s=after_s,
+    )
     with bar, closing(flown):
         for which, batch_costs in flown:
+            index = left[which]
             with deferred_interrupt() as is_interrupted:
-                costs[left[which]] = batch_costs
+                costs[index] = batch_costs
                 if keep:
-                    keep(left[which], batch_costs)
+                    keep(index, batch_costs)
             if is_interrupted():
                 raise KeyboardInterrupt
-            bar.move_to(num_flown(study, costs))
+            bar.advance(len(study.batches[index].seeds))
 
 
 def run_jobs(
@@ -128,13 +135,6 @@ def _inherited() -> Iterator[None]:
         os.environ.update(before)
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Flown:
-    # A line of the progress file but the first.
-    batch: int
-    costs: BatchCosts
-
-
 def progress_path(output: Path) -> Path:
     """Return where the progress towards an output is kept: beside it."""
     return output.with_name(f"{output.name}.progress")
@@ -142,12 +142,13 @@ def progress_path(output: Path) -> Path:
 
 def start_progress(path: Path, header: dict[str, Any]) -> None:
     """Begin a progress file, in place of any other; raise OSError if that cannot be."""
-    write_bytes(path, _line(b"", _json(header)))
+    write_bytes(path, _line(b"", msgspec.json.encode(header)))
 
 
 def append_progress(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
     """Add what a batch cost, by its index among the study's; raise OSError if that cannot be."""
-    append_bytes(path, _line(_json(header), _json({"batch": index, "costs": asdict(costs)})))
+    lists = {name: numbers.tolist() for name, numbers in vars(costs).items()}
+    append_bytes(path, _line(msgspec.json.encode(header), msgspec.json.encode([index, lists])))
 
 
 def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
@@ -163,21 +164,17 @@ def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]
     """
     content = read_file(path, "progress", MAX_BYTES)
     whole, _, cut_off = content.rpartition(b"\n")
-    if not whole and _line(b"", _json(header)).startswith(cut_off):
+    if not whole and _line(b"", msgspec.json.encode(header)).startswith(cut_off):
         start_progress(path, header)
         return {}
     lines = [line.partition(b" ")[2] for line in whole.split(b"\n")]
-    try:
-        before = read_json(lines[0], dict)
-        digested = [_line(b"" if line is lines[0] else lines[0], line) for line in lines]
-        if b"".join(digested) != whole + b"\n":
-            raise ValueError("a line does not have its digest")
-        flown = [read_json(line, _Flown) for line in lines[1:]]
-    except ValueError as error:
+    digested = [_line(b"" if line is lines[0] else lines[0], line) for line in lines]
+    if b"".join(digested) != whole + b"\n":
         raise ValueError(
             f"progress {path} is damaged, or of another version; start over with --force instead "
             "of --resume"
-        ) from error
+        )
+    before, *flown = map(msgspec.json.decode, lines)
     if difference := next(_differences("", before, header), ""):
         raise ValueError(
             f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
@@ -185,16 +182,17 @@ def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]
         )
     if cut_off:
         write_bytes(path, whole + b"\n")
-    return {each.batch: each.costs for each in flown}
+    # The digests have shown that this very code wrote the lines.
+    kinds = {"ages": np.int64}  # the others are floats, and null is nan
+    return {
+        index: BatchCosts(**{n: np.array(each, kinds.get(n, float)) for n, each in lists.items()})
+        for index, lists in flown
+    }
 
 
 def _line(first: bytes, text: bytes) -> bytes:
     """Return a line of JSON with its digest; `first` is the JSON of the file's first line."""
     return b"%b %b\n" % (hashlib.sha256(first + text).hexdigest()[:DIGEST_DIGITS].encode(), text)
-
-
-def _json(content: dict[str, Any]) -> bytes:
-    return json.dumps(content, allow_nan=False).encode()
 
 
 def _differences(name: str, before: object, now: object) -> Iterator[str]:

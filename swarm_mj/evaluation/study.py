@@ -93,6 +93,11 @@ class Study:
         pairs = product(self.regimes, self.policies)
         return list(dict.fromkeys((regime, flown_name(name, regime)) for regime, name in pairs))
 
+    @property
+    def num_missions(self) -> int:
+        """How many missions there are, of all policies in all regimes."""
+        return self.episodes * len(self.pairs)
+
     @cached_property
     def batches(self) -> tuple[Batch, ...]:
         """All the work, pair by pair, in the order of the seeds."""

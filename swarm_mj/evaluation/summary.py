@@ -15,7 +15,6 @@ from swarm_mj.evaluation.published import published
 from swarm_mj.evaluation.results import COLUMNS, Result
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
-from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import flown_name
 from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.system.writing import write_json
@@ -26,9 +25,6 @@ RESAMPLES = 9999  # of a bootstrap; SciPy's own choice
 BATCH = 1000  # resamples at once: bounds the memory that many samples take
 RESAMPLING_SEED = 0  # the same samples have the same interval, wherever they come from
 ROUNDING = 1e-12  # samples that differ by no more than this share of their size are constant
-
-# Numbers of missions by the name of their cost; nan where a mission has none.
-Samples = dict[str, Float[np.ndarray, "n"]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,118 +60,118 @@ def summarise(
     for index, batch in enumerate(study.batches):
         batches[batch.mission, batch.policy].append(costs[index])
     merged = {pair: merge(each) for pair, each in batches.items()}
-    evaluated = []
-    for (regime, policy), own in merged.items():
-        baseline, made = flown_name(study.compared_to, regime), study.make_policy(policy, regime)
-        columns = {
-            **_regime(study, policy, regime),
-            **_costs(own),
-            **_packets(own, regime, made),
-            **_differences(own, merged[regime, baseline]),
-            **_published(policy, None if study.components.names else regime),
-            "payload": made.payload,
-            "version": made_by["version"],
-            "commit": made_by["commit"],
-            "baseline": baseline,
-            "config": json.dumps(study.config(policy, regime)),
-        }
-        for name, value in columns.items():
-            if isinstance(value, float) and not math.isfinite(value):
-                columns[name] = None  # what does not exist, or never happened
-        task_cost = own["task_cost"]
-        evaluated.append(
-            Evaluated(
-                result=Result(**columns),
-                aoi=own["aoi"].tolist(),
-                velocity_variance=own["velocity_variance"].tolist(),
-                task_cost=None if np.isnan(task_cost).any() else task_cost.tolist(),
-            )
+    return [
+        Evaluated(
+            result=_result(study, regime, policy, merged, made_by),
+            aoi=own.aoi.tolist(),
+            velocity_variance=own.velocity_variance.tolist(),
+            task_cost=None if np.isnan(own.task_cost).any() else own.task_cost.tolist(),
         )
-    return evaluated
+        for (regime, policy), own in merged.items()
+    ]
 
 
-def merge(batches: Sequence[BatchCosts]) -> Samples:
+def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
     """Return batches of the same policy and regime as one, in the order given; `ages` add up."""
-    costs: Samples = {
-        spec.name: np.concatenate([np.array(getattr(b, spec.name), float) for b in batches])
-        for spec in fields(BatchCosts)
-        if spec.name != "ages"
-    }
-    return costs | {"ages": np.sum([batch.ages for batch in batches], axis=0)}
+    names = [spec.name for spec in fields(BatchCosts)]
+    joined = {name: np.concatenate([getattr(each, name) for each in batches]) for name in names}
+    return BatchCosts(**joined | {"ages": np.sum([each.ages for each in batches], axis=0)})
 
 
-def _regime(study: Study, policy: str, regime: Mission) -> dict[str, Any]:
-    repeated = {name: value for name, value in asdict(regime).items() if name in COLUMNS}
-    name, unit = study.task_cost(regime) or (None, None)
-    return {
-        **repeated,
+def _result(
+    study: Study,
+    regime: Mission,
+    policy: str,
+    merged: Mapping[tuple[Mission, str], BatchCosts],
+    made_by: Mapping[str, Any],
+) -> Result:
+    own, made = merged[regime, policy], study.make_policy(policy, regime)
+    baseline = flown_name(study.compared_to, regime)
+    task_cost_name, task_cost_unit = study.task_cost(regime) or (None, None)
+    columns: dict[str, Any] = {
+        **dict.fromkeys(COLUMNS),
+        **{name: value for name, value in asdict(regime).items() if name in COLUMNS},
         **study.components.names,
         "policy": policy,
         "radio": regime.beyond_free_space or None,
         "episodes": study.episodes,
         "seed": study.seed,
         "probability": study.parameters[regime, policy].get("probability"),
-        "task_cost_name": name,
-        "task_cost_unit": unit,
+        "task_cost_name": task_cost_name,
+        "task_cost_unit": task_cost_unit,
+        **_costs(own),
+        **_packets(own, regime, made.packet(regime).num_bytes),
+        "payload": made.payload,
+        "baseline": baseline,
+        **_differences(own, merged[regime, baseline]),
+        # The paper has no missions with parts of a user's own.
+        **({} if study.components.names else _published(policy, regime)),
+        "version": made_by["version"],
+        "commit": made_by["commit"],
+        "config": json.dumps(study.config(policy, regime)),
     }
+    for name, value in columns.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            columns[name] = None  # what does not exist, or never happened
+    return Result(**columns)
 
 
-def _costs(costs: Samples) -> dict[str, Any]:
+def _costs(costs: BatchCosts) -> dict[str, Any]:
     columns: dict[str, Any] = {}
     for name in COSTS:
-        columns |= {f"{name}_{figure}": value for figure, value in spread(costs[name]).items()}
+        figures = spread(getattr(costs, name))
+        columns |= {f"{name}_{figure}": value for figure, value in figures.items()}
     for name in ("aoi_steady", "aoi_floor", "task_cost", "task_cost_last"):
-        columns[f"{name}_mean"] = float(np.mean(costs[name]))
-        columns[f"{name}_sem"] = standard_error(costs[name])
+        samples = getattr(costs, name)
+        columns[f"{name}_mean"] = float(np.mean(samples))
+        columns[f"{name}_sem"] = standard_error(samples)
     for name, share in (("age_p95", 0.95), ("age_worst", 1.0)):
-        columns[name] = SLOT_WINDOWS * quantile_of_counts(costs["ages"], share)
+        columns[name] = SLOT_WINDOWS * quantile_of_counts(costs.ages, share)
     return {name: value for name, value in columns.items() if name in COLUMNS}
 
 
-def _packets(costs: Samples, regime: Mission, policy: Policy) -> dict[str, Any]:
-    num_sent, num_bytes = float(costs["packets_sent"].sum()), policy.packet(regime).num_bytes
-    num_windows = costs["aoi"].size * regime.num_windows
-    sent_bytes = num_bytes * float(costs["packets_transmitted"].sum())
+def _packets(costs: BatchCosts, regime: Mission, num_bytes: int) -> dict[str, Any]:
+    num_sent, num_windows = float(costs.packets_sent.sum()), costs.aoi.size * regime.num_windows
+    sent_bytes = num_bytes * float(costs.packets_transmitted.sum())
+
+    def per_packet(counts: Float[np.ndarray, "B"]) -> float:
+        """Return the share of all packets sent, or nan where there is none."""
+        applies = num_sent > 0.0 and not np.isnan(counts).all()
+        return float(np.nansum(counts)) / num_sent if applies else math.nan
+
     # A mission that never was complete counts as late as any, so that the median stays honest.
-    complete = np.nan_to_num(costs["complete_window"], nan=np.inf)
-
-    def per_packet(name: str) -> float:
-        counts = costs[name][~np.isnan(costs[name])]  # of the missions to which it applies
-        return float(counts.sum()) / num_sent if counts.size and num_sent else math.nan
-
+    complete = np.nan_to_num(costs.complete_window, nan=np.inf)
     return {
         "packets_per_window": num_sent / num_windows,
         "packet_bytes": num_bytes,
         "bytes_per_second": sent_bytes / (num_windows * regime.window_s),
-        "delivery_ratio": per_packet("packets_delivered"),
-        "heard_ratio": per_packet("packets_heard"),
-        "hearers_per_packet": per_packet("packets_receptions"),
-        "hops_mean": float(np.mean(costs["hops"])),
+        "delivery_ratio": per_packet(costs.packets_delivered),
+        "heard_ratio": per_packet(costs.packets_heard),
+        "hearers_per_packet": per_packet(costs.packets_receptions),
+        "hops_mean": float(np.mean(costs.hops)),
         "complete_window_median": float(np.median(complete)),
         "complete_share": float(np.mean(np.isfinite(complete))),
     }
 
 
-def _differences(costs: Samples, baseline: Samples) -> dict[str, Any]:
-    """Return paired differences, mission by mission; None of the baseline to itself."""
-    columns: dict[str, Any] = {}
+def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, float | None]:
+    """Return paired differences, mission by mission; nothing of the baseline to itself."""
+    columns: dict[str, float | None] = {}
     for cost in (*COSTS, "task_cost"):
-        difference, found = costs[cost] - baseline[cost], (None, None, None)
+        difference = getattr(costs, cost) - getattr(baseline, cost)
         if costs is not baseline and not np.isnan(difference).any():
-            found = (float(np.mean(difference)), *bootstrap_interval(difference))
-        names = (f"{cost}_difference_{name}" for name in ("mean", "ci_low", "ci_high"))
-        columns |= zip(names, found, strict=True)
+            low, high = bootstrap_interval(difference)
+            columns[f"{cost}_difference_mean"] = float(np.mean(difference))
+            columns[f"{cost}_difference_ci_low"] = low
+            columns[f"{cost}_difference_ci_high"] = high
     return columns
 
 
-def _published(policy: str, regime: Mission | None) -> dict[str, Any]:
-    """Return the paper's values; none for missions with custom parts."""
-    points = {} if regime is None else published(policy, regime)
-    return {
-        f"published_{cost}_{figure}": getattr(points[cost], figure) if cost in points else None
-        for cost in COSTS
-        for figure in ("mean", "sem")
-    }
+def _published(policy: str, regime: Mission) -> dict[str, float]:
+    columns: dict[str, float] = {}
+    for cost, point in published(policy, regime).items():
+        columns |= {f"published_{cost}_mean": point.mean, f"published_{cost}_sem": point.sem}
+    return columns
 
 
 def spread(samples: Float[np.ndarray, "n"]) -> dict[str, float | None]:

@@ -1,10 +1,10 @@
 """Results on the terminal: one table per regime, the lowest age first."""
 
 import io
-import re
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
-from typing import Any
+from typing import TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -23,17 +23,25 @@ NONE = "-"
 def results_text(results: Sequence[Result]) -> str:
     """Return the tables of `print_results` as plain text, for any terminal."""
     file = io.StringIO()
-    print_results(results, file=file, force_terminal=False)
+    print_results(results, file)
     return file.getvalue().rstrip()
 
 
-def print_results(results: Sequence[Result], **where: Any) -> None:
-    """Print a table per regime, whose results stand together, on a console made of `where`."""
-    how: dict[str, Any] = {"highlight": False, "markup": False, "force_jupyter": False, **where}
-    console = Console(**how)
+def print_results(results: Sequence[Result], file: TextIO | None = None) -> None:
+    """Print a table per regime, whose results stand together; plain text into a file."""
+    is_terminal = None if file is None else False
+    open_console = partial(
+        Console,
+        file=file,
+        force_terminal=is_terminal,
+        force_jupyter=False,
+        highlight=False,
+        markup=False,
+    )
+    console = open_console()
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
-    wide = Console(**how, width=width)
+    wide = open_console(width=width)
     for regime, group in groupby(results, _regime):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
@@ -64,62 +72,67 @@ def _regime(result: Result) -> str:
     )
 
 
-# Forms of cells by their columns' headings: a number that does not exist is a dash, and a part in
-# angle brackets is left out with it. `reached` is of packets, or of broadcasts at least one robot.
-COLUMNS = {
-    "AoI ± SEM\n95 %": "{aoi_mean:.2f}< ± {aoi_sem:.2f}>\n<{aoi_ci_low:.2f}, {aoi_ci_high:.2f}>",
-    "median\np95": "{aoi_median:.2f}\n{aoi_p95:.2f}",
-    "difference\n95 %": (
-        "{aoi_difference_mean:.2f}\n<{aoi_difference_ci_low:.2f}, {aoi_difference_ci_high:.2f}>"
-    ),
-    "packets\nreached": "{packets_per_window:.2f}\n{reached:.0%}",
-    "hearers\nbytes": "{hearers_per_packet:.2f}\n{packet_bytes:,d}",
-}
-OF_COSTED = {
-    "task cost\nat the end": (
-        "{task_cost_mean:.2f}< ± {task_cost_sem:.2f}>\n"
-        "{task_cost_last_mean:.2f}< ± {task_cost_last_sem:.2f}>"
-    ),
-    "difference\nof task cost": (
-        "{task_cost_difference_mean:.2f}\n"
-        "<{task_cost_difference_ci_low:.2f}, {task_cost_difference_ci_high:.2f}>"
-    ),
-}
-PUBLISHED = "{published_aoi_mean:.2f}< ± {published_aoi_sem:.2f}>"
-OF_FLOCKS = {
-    "velocity\nvariance": "{velocity_variance_mean:.4f}",
-    "published\nAoI, var.": PUBLISHED + "<\n{published_velocity_variance_mean:.4f}>",
-}
-OF_OTHERS = {"published\nAoI": PUBLISHED}
-
-
 def _table(results: Sequence[Result]) -> Table:
-    of_task = OF_FLOCKS if results[0].task == "flocking" else OF_OTHERS
-    columns = COLUMNS | (OF_COSTED if _has_own_cost(results[0]) else of_task)
     table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
     table.add_column("policy", no_wrap=True)
-    for name in columns:
-        table.add_column(name, justify="right")
-    for result in results:
-        table.add_row(_name(result), *(_cell(form, result) for form in columns.values()))
+    rows = [_cells(result) for result in results]
+    headings = list(rows[0])
+    for heading in headings:
+        table.add_column(heading, justify="right")
+    for result, cells in zip(results, rows, strict=True):
+        table.add_row(_name(result), *(cells.get(heading, NONE) for heading in headings))
     return table
 
 
-def _cell(form: str, result: Result) -> str:
+def _cells(result: Result) -> dict[str, str]:
+    """Return a result's cells, of one or two lines, by the headings of their columns."""
+    # Requests reach their addressee, broadcasts at least one robot.
     reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
-    numbers = {**vars(result), "reached": reached}
+    mean = _plus_minus(result.aoi_mean, result.aoi_sem)
+    cells = {
+        "AoI ± SEM\n95 %": f"{mean}\n{_interval(result.aoi_ci_low, result.aoi_ci_high)}",
+        "median\np95": f"{result.aoi_median:.2f}\n{result.aoi_p95:.2f}",
+        "difference\n95 %": _difference(result, "aoi"),
+        "packets\nreached": f"{result.packets_per_window:.2f}\n{_number(reached, '.0%')}",
+        "hearers\nbytes": (
+            f"{_number(result.hearers_per_packet)}\n{_number(result.packet_bytes, ',d')}"
+        ),
+    }
+    published = _plus_minus(result.published_aoi_mean, result.published_aoi_sem)
+    if _has_own_cost(result):
+        whole = _plus_minus(result.task_cost_mean, result.task_cost_sem)
+        last = _plus_minus(result.task_cost_last_mean, result.task_cost_last_sem)
+        cells["task cost\nat the end"] = f"{whole}\n{last}"
+        cells["difference\nof task cost"] = _difference(result, "task_cost")
+    elif result.task == "flocking":
+        variance = result.published_velocity_variance_mean
+        cells["velocity\nvariance"] = f"{result.velocity_variance_mean:.4f}"
+        cells["published\nAoI, var."] = (
+            published if variance is None else f"{published}\n{variance:.4f}"
+        )
+    else:
+        cells["published\nAoI"] = published
+    return cells
 
-    def optional(part: re.Match[str]) -> str:
-        """Return a part of the form, or nothing if a number in it is missing."""
-        names = re.findall(r"{(\w+):", part[1])
-        return "" if any(numbers[name] is None for name in names) else part[1]
 
-    def number(field: re.Match[str]) -> str:
-        """Return a number in its format."""
-        value = numbers[field[1]]
-        return NONE if value is None else format(value, field[2])
+def _number(value: float | None, form: str = ".2f") -> str:
+    return NONE if value is None else format(value, form)
 
-    return re.sub(r"{(\w+):([^}]+)}", number, re.sub(r"<(.+?)>", optional, form, flags=re.DOTALL))
+
+def _plus_minus(mean: float | None, sem: float | None) -> str:
+    return _number(mean) if sem is None else f"{_number(mean)} ± {sem:.2f}"
+
+
+def _interval(low: float | None, high: float | None) -> str:
+    """Return both ends, or nothing where there is no interval."""
+    return "" if low is None or high is None else f"{low:.2f}, {high:.2f}"
+
+
+def _difference(result: Result, cost: str) -> str:
+    mean, low, high = (
+        getattr(result, f"{cost}_difference_{figure}") for figure in ("mean", "ci_low", "ci_high")
+    )
+    return f"{_number(mean)}\n{_interval(low, high)}"
 
 
 def _has_own_cost(result: Result) -> bool:

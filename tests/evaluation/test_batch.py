@@ -18,7 +18,7 @@ from swarm_mj.evaluation.batch import (
 )
 from swarm_mj.mission import paper
 from swarm_mj.mission.placement import is_connected
-from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout, summarise
@@ -59,25 +59,22 @@ def test_costs_are_those_of_the_flight(policy, failure_fraction):
     receptions = summary.hearers_per_packet * summary.packets_sent
     for name in TOTALS:
         expected = getattr(summary, f"packets_{name}", receptions)
-        counted = getattr(costs, f"packets_{name}")
-        np.testing.assert_allclose(np.array(counted, dtype=float), expected)
-    expected = [None if np.isnan(t) else t for t in summary.complete_window]
-    assert costs.complete_window == expected
+        np.testing.assert_allclose(getattr(costs, f"packets_{name}"), expected)
+    np.testing.assert_array_equal(costs.complete_window, summary.complete_window)
     steady = [window.costs.age_windows for window in flown[15:]]  # the later 16 of 31
     np.testing.assert_allclose(costs.aoi_steady, np.mean(steady, axis=0))
     np.testing.assert_allclose(costs.aoi_floor, np.mean(floors, axis=0))
-    assert costs.ages == [ages.count(half / 2.0) for half in range(2 * 31 + 1)]
+    assert costs.ages.tolist() == [ages.count(half / 2.0) for half in range(2 * 31 + 1)]
 
 
 def test_the_floor_is_the_age_that_falling_apart_leaves():
     """Connected teams at rest have none; from when a team first falls apart it has."""
-    assert fly_batch(batch(small("stationary"))).aoi_floor == [0.0, 0.0, 0.0]
+    assert not np.any(fly_batch(batch(small("stationary"))).aoi_floor)
     fast = small(velocity_ratio=2.0)
     swarm, fell_apart = Swarm(fast, SEEDS), np.zeros(3, dtype=bool)
     for _ in rollout(swarm, make_policy("mst", fast)):
         fell_apart |= [not is_connected(p, fast.range_m) for p in swarm.states.position_m]
-    floor = np.array(fly_batch(batch(fast)).aoi_floor)
-    np.testing.assert_array_equal(floor > 0.0, fell_apart)
+    np.testing.assert_array_equal(fly_batch(batch(fast)).aoi_floor > 0.0, fell_apart)
     assert fell_apart.any()
 
 
@@ -90,10 +87,10 @@ def test_a_mission_does_not_depend_on_those_beside_it(policy, task):
     together = fly_batch(batch(mission, policy, probability=None))
     apart = [fly_batch(batch(mission, policy, (s,), probability=None)) for s in SEEDS]
     for name, costs in vars(together).items():
-        each = np.array([getattr(alone, name) for alone in apart], dtype=object)
-        assert costs == (each.sum(axis=0) if name == "ages" else each.ravel()).tolist()
+        each = np.array([getattr(alone, name) for alone in apart])
+        np.testing.assert_array_equal(costs, each.sum(axis=0) if name == "ages" else each.ravel())
     swapped = fly_batch(batch(mission, policy, SEEDS[::-1], probability=None))
-    assert swapped.aoi == together.aoi[::-1]
+    np.testing.assert_array_equal(swapped.aoi, together.aoi[::-1])
 
 
 def test_ages_by_hand():
@@ -112,13 +109,13 @@ def test_over_a_custom_channel_there_is_no_floor():
     mission = small("stationary")
     radio = radio_of(mission)
     for channel, expected in (
-        (radio, [0.0]),
-        (replace(radio, power_mw=2.0 * radio.power_mw), [None]),
-        (lambda *given: radio(*given), [None]),
+        (radio, 0.0),
+        (replace(radio, power_mw=2.0 * radio.power_mw), np.nan),
+        (lambda *given: radio(*given), np.nan),
     ):
         swarm = Swarm(mission, [1], channel=channel)
         costs = costs_of(swarm, rollout(swarm, make_policy("mst", mission)))
-        assert costs.aoi_floor == expected
+        np.testing.assert_array_equal(costs.aoi_floor, [expected])
 
 
 def empty(num_missions, num_robots):
@@ -177,7 +174,7 @@ def test_floor_as_by_components_of_a_graph(seed, num_missions, num_robots):
 @pytest.mark.parametrize(
     ("name", "task", "failing"),
     [
-        *((name, "random-walk", 0.0) for name in POLICIES),
+        *((name, "random-walk", 0.0) for name in ("random-flooding", "planner", "greedy-oracle")),
         *((name, "random-walk", 0.4) for name in ("mst", "tdma")),
         *(("mst", "stationary", 0.0), ("mst", "flocking", 0.0)),
     ],

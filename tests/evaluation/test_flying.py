@@ -1,11 +1,12 @@
 """Flights on several processes, all done once; and the file that gives them back bit for bit."""
 
-import json
 import multiprocessing
 import os
 import signal
 import time
+from dataclasses import fields
 
+import numpy as np
 import pytest
 
 from swarm_mj.evaluation.batch import BatchCosts
@@ -110,22 +111,18 @@ HEADER = {"commit": "abc", "seed": 1000, "policies": [{"policy": "mst", "probabi
 
 
 def some_costs(number):
-    return BatchCosts(
-        aoi=[number, 0.1 + 0.2],
-        aoi_steady=[1e-300, 2.0],
-        aoi_floor=[0.0, 1.0 / 3.0],
-        velocity_variance=[1e22, 5e-324],
-        hops=[1.0, 2.0],
-        task_cost=[None, 0.5],
-        task_cost_last=[None, 1e9],
-        complete_window=[None, 7],
-        packets_sent=[1, 2],
-        packets_transmitted=[1, 3],
-        packets_delivered=[0, None],
-        packets_heard=[None, 2],
-        packets_receptions=[None, 5],
-        ages=[0, 3, 2**40],
-    )
+    """Floats that text keeps only if it keeps all their digits, and what does not exist."""
+    awkward = np.array([number, 0.1 + 0.2, 1e-300, 1.0 / 3.0, 1e22, 5e-324, np.nan])
+    costs = {spec.name: awkward for spec in fields(BatchCosts)}
+    return BatchCosts(**costs | {"ages": np.array([0, 3, 2**40])})
+
+
+def assert_resumed(path, expected):
+    """The batches that come back, by their indices, to the last bit."""
+    found = resume_progress(path, HEADER)
+    assert list(found) == list(expected)
+    for index, costs in found.items():
+        np.testing.assert_equal(vars(costs), vars(expected[index]))
 
 
 def some_progress(path, *indices):
@@ -138,7 +135,7 @@ def some_progress(path, *indices):
 def test_what_was_appended_comes_back(tmp_path):
     path = some_progress(progress_path(tmp_path / "new" / "a.csv"), 3, 0)
     assert path == tmp_path / "new" / "a.csv.progress"
-    assert resume_progress(path, HEADER) == {3: some_costs(3 / 7.0), 0: some_costs(0.0)}
+    assert_resumed(path, {3: some_costs(3 / 7.0), 0: some_costs(0.0)})
     assert len(path.read_bytes().splitlines()) == 3
 
 
@@ -147,7 +144,7 @@ def test_a_line_that_was_cut_off_is_dropped(tmp_path, num_cut):
     path = some_progress(tmp_path / "p", 0, 1)
     whole = path.read_bytes()
     path.write_bytes(whole[:-num_cut])
-    assert resume_progress(path, HEADER) == {0: some_costs(0.0)}
+    assert_resumed(path, {0: some_costs(0.0)})
     append_progress(path, HEADER, 1, some_costs(1 / 7.0))
     assert path.read_bytes() == whole
 
@@ -158,7 +155,7 @@ def test_not_even_a_header_is_a_new_start(tmp_path, num_bytes):
     path.write_bytes(path.read_bytes()[:num_bytes])
     assert resume_progress(path, HEADER) == {}
     append_progress(path, HEADER, 4, some_costs(0.5))
-    assert resume_progress(path, HEADER) == {4: some_costs(0.5)}
+    assert_resumed(path, {4: some_costs(0.5)})
 
 
 @pytest.mark.parametrize(
@@ -182,9 +179,7 @@ def test_another_evaluations_progress_is_refused_and_kept(tmp_path, changes, com
     assert path.read_bytes() == before
 
 
-@pytest.mark.parametrize(
-    "line", ["policy,task", "[]", "{}", '{"batch": 1, "costs": {"aoi": []}}', "\xff", "another's"]
-)
+@pytest.mark.parametrize("line", ["policy,task", '[1, {"aoi": []}]', "\xff", "another's"])
 def test_damage_before_the_last_line_is_found(tmp_path, line):
     """As is a line of another evaluation, whose digest is right for another header."""
     path, other = some_progress(tmp_path / "p", 0), tmp_path / "other"
@@ -198,12 +193,3 @@ def test_damage_before_the_last_line_is_found(tmp_path, line):
         with pytest.raises(ValueError, match=r"is damaged, or of another version; .* --force"):
             resume_progress(path, HEADER)
         assert path.read_bytes() == content
-
-
-def test_numbers_that_are_none_never_get_in(tmp_path):
-    path = some_progress(tmp_path / "p")
-    with pytest.raises(ValueError, match="not JSON compliant"):
-        append_progress(path, HEADER, 0, some_costs(float("nan")))
-    assert [json.loads(line.partition(" ")[2]) for line in path.read_text().splitlines()] == [
-        HEADER
-    ]

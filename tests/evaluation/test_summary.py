@@ -49,7 +49,8 @@ def costs(aoi, **overrides):
         "packets_receptions": [None] * n,
         "ages": [1000] + [0] * 1000,
     }
-    return BatchCosts(**(made_up | overrides))
+    arrays = {name: np.array(each, float) for name, each in (made_up | overrides).items()}
+    return BatchCosts(**arrays | {"ages": arrays["ages"].astype(int)})
 
 
 def two_policies(regime=STATIONARY, **overrides):
@@ -88,11 +89,7 @@ def results(*given):
 def with_task_costs():
     """A tenth of the age in metres, at the end a twentieth."""
     return [
-        replace(
-            batch,
-            task_cost=[age / 10.0 for age in batch.aoi],
-            task_cost_last=[age / 20.0 for age in batch.aoi],
-        )
+        replace(batch, task_cost=batch.aoi / 10.0, task_cost_last=batch.aoi / 20.0)
         for batch in (*MST, *ROUND_ROBIN)
     ]
 
@@ -271,12 +268,6 @@ def test_samples_that_do_not_vary_have_no_interval(samples):
     assert bootstrap_interval(np.array(samples)) == (None, None)
     found = spread(np.array(samples))
     assert (found["ci_low"], found["ci_high"]) == (None, None)
-
-
-@pytest.mark.parametrize("samples", [[1.0, 2.0], [0.0, 0.0, 0.0, 1.0], [1e-9, 2e-9, 1e9]])
-def test_few_samples_still_have_an_interval_around_them(samples):
-    low, high = bootstrap_interval(np.array(samples))
-    assert min(samples) <= low <= high <= max(samples)
 
 
 @pytest.mark.parametrize(

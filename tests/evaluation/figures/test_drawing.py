@@ -97,6 +97,16 @@ def test_a_level_is_a_line_with_a_band():
     np.testing.assert_array_equal(bars(axes)["GNN, published"][0].get_xdata(), range(6))
 
 
+def test_panels_have_one_height_in_every_figure():
+    """3.3 inches, 0.35 between two, 0.86 above and 0.75 below them."""
+    one, two = draw(FIG4, everything()), draw(FIG6, everything())
+    for drawing, places in ((one, [(0.75, 4.05)]), (two, [(4.4, 7.7), (0.75, 4.05)])):
+        height_in = drawing.get_figheight()
+        found = [np.multiply(axes.get_position().intervaly, height_in) for axes in drawing.axes]
+        np.testing.assert_allclose(found, places)
+        assert height_in == pytest.approx(places[0][1] + 0.86)
+
+
 def test_flocking_has_a_panel_for_each_cost():
     results = [result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01)]
     above, below = draw(FIG6, results).axes
