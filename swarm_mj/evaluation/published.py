@@ -4,11 +4,11 @@ Source of `published.csv`, mean and standard deviation over 100 missions a point
 Figs. 3 to 6, which the paper's authors published with their code; one row per point and cost,
 methods named as in the figures.
 
-Figs. 3 and 4 both give a stationary team at range ratio 0.25, from different missions: Fig. 3 draws
-it as the baselines' level lines (44.43, 45.28, 42.02), Fig. 4 as a point of its curves (46.76,
-47.28, 43.31). Both are in `points`; evaluations are compared with Fig. 4's, whose curve they
-sweep. Fig. 5's curves fit random walks, not stationary teams: its
-40 robots cost what random walks of 40 cost at range ratio 0.25 and velocity ratio 0.15.
+Figs. 3 and 4 both show a stationary team at range ratio 0.25, but from different missions: in
+Fig. 3 the baselines are level lines (44.43, 45.28, 42.02), in Fig. 4 points of curves (46.76,
+47.28, 43.31). `points` has both. Evaluations are compared with Fig. 4, because they sweep its x
+axis. Fig. 5's curves fit random walks, not stationary teams: at 40 robots they cost what random
+walks cost at range ratio 0.25 and velocity ratio 0.15.
 """
 
 import math

@@ -186,9 +186,7 @@ def test_no_policy_goes_below_the_floor(name, task, failing):
     swarm, known = Swarm(mission, [1, 2]), empty(2, 8)
     floors = []
     for flown in rollout(swarm, make_policy(name, mission)):
-        on = swarm.states.is_active
-        is_on = np.ones((2, 8), dtype=bool) if on is None else on
         place = swarm.states.position_m, mission.range_m
-        floors.append(connectivity_floor(known, *place, swarm.now, is_on))
+        floors.append(connectivity_floor(known, *place, swarm.now, active(swarm)))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
     assert (np.max(floors) > 0.0) == (task != "stationary")

@@ -234,16 +234,6 @@ def test_json_has_the_columns_with_each_missions_costs(tmp_path):
     assert not list(tmp_path.iterdir())
 
 
-def test_spread_by_hand():
-    """Squares of the distances to the mean of 3: 4, 1, 0, 1, 4 are 10; 10 / (5 - 1) = 2.5."""
-    found = spread(np.array([5.0, 1.0, 3.0, 2.0, 4.0]))
-    errors = {"std": math.sqrt(2.5), "sem": math.sqrt(2.5 / 5.0)}
-    p95 = 4.0 + 0.8  # 95 % of the way over 4 gaps: 3.8 gaps
-    interval = {name: found[name] for name in ("ci_low", "ci_high")}
-    expected = {"mean": 3.0, "median": 3.0, "p95": p95, "worst": 5.0} | errors | interval
-    assert found == pytest.approx(expected)
-
-
 def test_the_interval_is_near_a_plain_bootstraps_and_students():
     samples = np.random.default_rng(1).normal(50.0, 10.0, size=100)
     low, high = bootstrap_interval(samples)

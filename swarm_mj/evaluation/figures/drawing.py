@@ -49,12 +49,12 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
             hspace=GAP_IN / PANEL_IN,
         )
         for axes, panel in zip(grid[:, 0], figure.panels, strict=True):
-            its = curves(figure, panel.cost, found)
-            _set_axes(axes, figure, panel, its)
-            for curve in its:
+            shown = curves(figure, panel.cost, found)
+            _set_axes(axes, figure, panel, shown)
+            for curve in shown:
                 _draw_curve(axes, curve)
             axes.autoscale_view()  # or else the names would be placed by the limits before
-            name_ends(axes, its)
+            name_ends(axes, shown)
         grid[-1, 0].set_xlabel(figure.x_label)
         _head(drawing, figure, found, height_in)
         write_caption(drawing, LEFT, 0.12 / height_in, caption(figure, found))
@@ -72,8 +72,8 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
         f"{figure.name}, preset {result.preset}: {result.episodes} missions, seeds {result.seed} "
         f"to {last}, {result.num_windows} windows each; {code}"
     ]
-    if its := budgets(results):
-        least, most = (f"{number:,}" for number in (its[0], its[-1]))
+    if decisions := budgets(results):
+        least, most = f"{decisions[0]:,}", f"{decisions[-1]:,}"
         numbers = most if least == most else f"{least} to {most}"
         lines.append(f"our GNNs: trained on {numbers} {PAPERS_BUDGET}")
     return "\n".join(lines)
@@ -103,11 +103,11 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
         axes.fill_between(curve.x, low, high, color=look.colour, alpha=0.2, linewidth=0.0)
 
 
-def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, its: Sequence[Curve]) -> None:
+def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, shown: Sequence[Curve]) -> None:
     """Set scales, margins and ticks, which the names of curves depend on."""
     axes.set(xscale=figure.x_scale, yscale=panel.scale)
     axes.margins(0.03, HEADROOM)
-    x = np.concatenate([curve.x for curve in its])
+    x = np.concatenate([curve.x for curve in shown])
     axes.xaxis.set_major_locator(FixedLocator(np.unique(x).tolist()))
     axes.xaxis.set_minor_locator(NullLocator())
     axes.xaxis.set_major_formatter(PLAIN)
@@ -149,15 +149,15 @@ def _head(
     )
 
 
-def name_ends(axes: Axes, its: Sequence[Curve]) -> None:
+def name_ends(axes: Axes, shown: Sequence[Curve]) -> None:
     """Write each method's name next to the axes, as close to the end of its curve as possible.
 
     Names of methods that only the paper has are slanted. The limits of the axes must be set.
     """
-    named = {curve.method: curve for curve in its}  # ours come last
+    named = {curve.method: curve for curve in shown}  # ours come last
     ends = [(curve.x[-1], curve.mean[-1]) for curve in named.values()]
     fraction = axes.transAxes.inverted().transform(axes.transData.transform(ends))
-    places = spread(fraction[:, 1], LINE_IN / (axes.bbox.height / axes.figure.dpi))
+    places = keep_apart(fraction[:, 1], LINE_IN / (axes.bbox.height / axes.figure.dpi))
     for curve, end, place in zip(named.values(), ends, places, strict=True):
         look = look_of(curve.method)
         line = {"color": look.colour, "linestyle": "--" if curve.is_published else "-"}
@@ -188,7 +188,7 @@ def name_of(curve: Curve) -> str:
     return f"{label} {MORE}" if curve.carries_more else label
 
 
-def spread(wanted: Float[np.ndarray, "L"], gap: float) -> Float[np.ndarray, "L"]:
+def keep_apart(wanted: Float[np.ndarray, "L"], gap: float) -> Float[np.ndarray, "L"]:
     """Return the places nearest to those wanted, in least squares, that keep their order and a gap.
 
     They stand from 0 to 1, if there is room for all.

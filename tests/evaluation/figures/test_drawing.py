@@ -8,7 +8,7 @@ from matplotlib.text import Text
 from scipy.optimize import minimize
 from synthetic import everything, result, sweep
 
-from swarm_mj.evaluation.figures.drawing import draw, spread
+from swarm_mj.evaluation.figures.drawing import draw, keep_apart
 from swarm_mj.evaluation.figures.style import LOOKS
 from swarm_mj.evaluation.published import RESULT_FIGURES
 
@@ -180,8 +180,8 @@ def test_nothing_that_is_written_overlaps_or_leaves_the_page():
         ([0.0, 0.5, 1.0], 1.0, [0.0, 1.0, 2.0]),  # more than fit keep their distance
     ],
 )
-def test_names_are_spread_by_hand(wanted, gap, places):
-    np.testing.assert_allclose(spread(np.array(wanted), gap), places)
+def test_names_are_kept_apart_by_hand(wanted, gap, places):
+    np.testing.assert_allclose(keep_apart(np.array(wanted), gap), places)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -198,4 +198,4 @@ def test_they_are_as_near_as_can_be(seed):
         method="SLSQP",
         options={"ftol": 1e-14, "maxiter": 500},
     )
-    np.testing.assert_allclose(spread(wanted, gap), solved.x, atol=1e-5)
+    np.testing.assert_allclose(keep_apart(wanted, gap), solved.x, atol=1e-5)
