@@ -4,7 +4,6 @@ import io
 from collections.abc import Iterator, Sequence
 from functools import partial
 from itertools import groupby
-from typing import TextIO
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -27,7 +26,7 @@ def results_text(results: Sequence[Result]) -> str:
     return file.getvalue().rstrip()
 
 
-def print_results(results: Sequence[Result], file: TextIO | None = None) -> None:
+def print_results(results: Sequence[Result], file: io.StringIO | None = None) -> None:
     """Print a table per regime, whose results stand together; plain text into a file."""
     is_terminal = None if file is None else False
     open_console = partial(
