@@ -35,7 +35,7 @@ Product = TypeVar("Product")
 # Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
 # look for a window system, which it does by a program that complains if it is left.
 SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-# Nor does any run what lies in the folder one stands in, as `python -c` would.
+# Nor does any import modules of the current folder, as `python -c` would.
 SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 DIGEST_DIGITS = 16
 MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
