@@ -9,6 +9,7 @@ from typing import Any
 from swarm_mj.cli.options import flags_of, nested, nested_option
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.mission.components import GROUP, SHOWN_AS, Components
+from swarm_mj.mission.specification import NEEDED
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
@@ -17,16 +18,6 @@ NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
 _policy, TUNED = partial(setting, group="policies"), "tuned for the regime"
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
-# Fields that count only where another has this value, or for None any above 0.
-NEEDED: dict[str, tuple[str, str | None]] = {
-    "loss_exponent": ("path_loss", "log-distance"),
-    "reference_m": ("path_loss", "log-distance"),
-    "antenna_height_m": ("path_loss", "two-ray"),
-    "shadowing_distance_m": ("shadowing_db", None),
-    "rician_k": ("fading", "rician"),
-    "burst_end": ("burst_begin", None),
-    "high_power_db": ("high_power_fraction", None),
-}
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -5,7 +5,7 @@ Where the paper's text and its authors' code differ, each difference is a field 
 """
 
 import math
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, get_args
 
@@ -34,6 +34,19 @@ MIN_SURVIVORS = 2  # whatever the fraction that fails, so that there is an age o
 OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
+# The channel's effects beyond free space, unless they are one of `OFF`; and the numbers that count
+# only where an effect is on, or, if a value is named, where it is that.
+EFFECTS = ("path_loss", "shadowing_db", "fading", "erasure", "burst_begin", "high_power_fraction")
+OFF = ("free-space", "none", 0)
+NEEDED: dict[str, tuple[str, str | None]] = {
+    "loss_exponent": ("path_loss", "log-distance"),
+    "reference_m": ("path_loss", "log-distance"),
+    "antenna_height_m": ("path_loss", "two-ray"),
+    "shadowing_distance_m": ("shadowing_db", None),
+    "rician_k": ("fading", "rician"),
+    "burst_end": ("burst_begin", None),
+    "high_power_db": ("high_power_fraction", None),
+}
 NEW = "not the paper's"  # the source of what the paper has not
 
 
@@ -264,16 +277,11 @@ class Mission:
     @property
     def beyond_free_space(self) -> str:
         """The channel's differences from the paper's, in words; empty for free space."""
-        default = {spec.name: spec.default for spec in fields(self)} | {"num_high_power": 0}
-        laws = {"log-distance": ["loss_exponent", "reference_m"], "two-ray": ["antenna_height_m"]}
-        numbers = {  # of each effect, by the field that switches it on
-            "path_loss": laws.get(self.path_loss, []),
-            "shadowing_db": ["shadowing_distance_m"],
-            "fading": ["rician_k"] if self.fading == "rician" else [],
-            "erasure": [],
-            "burst_begin": ["burst_end"],
-            "num_high_power": ["high_power_db"],
-        }
-        on = [name for name in numbers if getattr(self, name) != default[name]]
-        named = [name for effect in on for name in (effect, *numbers[effect])]
+        named: list[str] = []
+        for effect in EFFECTS:
+            # A fraction that rounds to no robot is no effect.
+            name = "num_high_power" if effect == "high_power_fraction" else effect
+            if (state := getattr(self, name)) not in OFF:
+                counting = ((effect, None), (effect, state))
+                named += [name, *(number for number in NEEDED if NEEDED[number] in counting)]
         return ", ".join(f"{name} {as_typed(getattr(self, name))}" for name in named)
