@@ -16,6 +16,7 @@ from swarm_mj.system.compiled import compiled
 NO_PARENT = -1  # of oneself, and of a teammate never heard of over the radio
 BROADCAST = -1  # the recipient of a packet for everyone who hears it
 NEVER = 0.0  # T_0 and L_0: the clock's first tick is half a window, so 0 is before everything
+ABSENT = -np.inf  # T of an entry that a packet has no room for: older than all that is held
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +71,15 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
     """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
-    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps
-    _write_own(*known, states.position_m, states.velocity_mps, now, states.is_active)
+    _write_own(
+        buffers.timestamp,
+        buffers.position_m,
+        buffers.velocity_mps,
+        states.position_m,
+        states.velocity_mps,
+        now,
+        states.is_active,
+    )
 
 
 def record_attempt(
@@ -93,18 +101,24 @@ def record_attempt(
 def merge(
     buffers: Buffers,
     heard: Int[np.ndarray, "B N"],
-    is_sent: Bool[np.ndarray, "B N N"] | None = None,
+    sent: Float[np.ndarray, "B N N"] | None = None,
 ) -> None:
     """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
 
-    A packet holds its sender's buffer as it was before the phase, or those entries of it that were
-    sent. Information that comes straight from its subject gets the receiver as parent (II-B:
-    P^{i,k} = i). An entry keeps its parent if the parent's own entry is in the packet, and
-    otherwise names the sender: so buffers remain trees, although some robots on the way are left
-    out.
+    A packet holds its sender's buffer as it was before the phase: all of it, or the entries with a
+    T in `sent[b, i]`, others being `ABSENT`. Information that comes straight from its subject gets
+    the receiver as parent (II-B: P^{i,k} = i). An entry keeps its parent if the parent's own entry
+    is in the packet, and otherwise names the sender: so buffers remain trees, although some robots
+    on the way are left out.
     """
-    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent
-    _merge_newer(*known, heard, is_sent)
+    _merge_newer(
+        buffers.timestamp if sent is None else sent,
+        heard,
+        buffers.timestamp,
+        buffers.position_m,
+        buffers.velocity_mps,
+        buffers.parent,
+    )
 
 
 @compiled()
@@ -147,63 +161,46 @@ def _write_attempt(
                 last_attempt[b, i, j] = now[b]
 
 
-# In these two, None for `is_sent` is compiled apart, without the test.
-@compiled()
-def _is_taken(
-    sent: float, held: float, is_sent: Bool[np.ndarray, "B N N"] | None, b: int, j: int, k: int
-) -> bool:
-    """Return whether j's packet has an entry of k that is newer than what its receiver holds."""
-    if is_sent is not None and not is_sent[b, j, k]:
-        return False
-    return is_newer(sent, held)
-
-
-@compiled()
-def _new_parent(
-    sent: int, is_sent: Bool[np.ndarray, "B N N"] | None, b: int, i: int, j: int, k: int
-) -> int:
-    """Return the parent of k for i, which decoded j; the sender if that one's entry is absent."""
-    if k == j:
-        return i
-    if is_sent is not None and not is_sent[b, j, sent]:
-        return j
-    return sent
-
-
 @compiled()
 def _merge_newer(
+    sent: Float[np.ndarray, "B N N"],
+    heard: Int[np.ndarray, "B N"],
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N N 2"],
     velocity_mps: Float[np.ndarray, "B N N 2"],
     parent: Int[np.ndarray, "B N N"],
-    heard: Int[np.ndarray, "B N"],
-    is_sent: Bool[np.ndarray, "B N N"] | None,
 ) -> None:
     num_missions, num_robots = heard.shape
     for b in range(num_missions):
-        senders_listen = False
-        for i in range(num_robots):
-            j = heard[b, i]
-            senders_listen |= j != i and heard[b, j] != j
         # Packets are read from the buffers before the phase: a copy where a sender also decodes,
         # which only the reference preset lets happen; else no row is both read and written.
-        sent, sent_parent, sent_m, sent_mps = (
-            timestamp[b],
-            parent[b],
-            position_m[b],
-            velocity_mps[b],
-        )
-        if senders_listen:
-            sent, sent_parent = sent.copy(), sent_parent.copy()
-            sent_m, sent_mps = sent_m.copy(), sent_mps.copy()
+        sent_t, sent_m, sent_mps, sent_parent = sent[b], position_m[b], velocity_mps[b], parent[b]
+        if _senders_listen(heard[b]):
+            sent_t, sent_m = sent_t.copy(), sent_m.copy()
+            sent_mps, sent_parent = sent_mps.copy(), sent_parent.copy()
         for i in range(num_robots):
             j = heard[b, i]
-            if j != i:
-                for k in range(num_robots):
-                    if _is_taken(sent[j, k], timestamp[b, i, k], is_sent, b, j, k):
-                        timestamp[b, i, k] = sent[j, k]
-                        position_m[b, i, k, 0] = sent_m[j, k, 0]
-                        position_m[b, i, k, 1] = sent_m[j, k, 1]
-                        velocity_mps[b, i, k, 0] = sent_mps[j, k, 0]
-                        velocity_mps[b, i, k, 1] = sent_mps[j, k, 1]
-                        parent[b, i, k] = _new_parent(sent_parent[j, k], is_sent, b, i, j, k)
+            if j == i:
+                continue
+            for k in range(num_robots):
+                if is_newer(sent_t[j, k], timestamp[b, i, k]):
+                    timestamp[b, i, k] = sent_t[j, k]
+                    for axis in range(2):
+                        position_m[b, i, k, axis] = sent_m[j, k, axis]
+                        velocity_mps[b, i, k, axis] = sent_mps[j, k, axis]
+                    parent[b, i, k] = i if k == j else _kept_parent(sent_parent[j, k], sent_t, j)
+
+
+@compiled()
+def _senders_listen(heard: Int[np.ndarray, "N"]) -> bool:
+    """Return whether anyone's packet is decoded that decodes one itself."""
+    listens = False
+    for i in range(heard.shape[0]):
+        listens |= heard[i] != i and heard[heard[i]] != heard[i]
+    return listens
+
+
+@compiled()
+def _kept_parent(parent: int, sent_t: Float[np.ndarray, "N N"], j: int) -> int:
+    """Return the parent that an entry names in j's packet, or j if that one's entry is absent."""
+    return j if sent_t[j, parent] == ABSENT else parent

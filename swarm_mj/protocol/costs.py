@@ -1,6 +1,7 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
 from dataclasses import dataclass, fields
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -32,7 +33,7 @@ class Packets:
     receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
 
 
-PACKETS = tuple(spec.name for spec in fields(Packets))
+PACKET_COUNTS = tuple(spec.name for spec in fields(Packets))
 
 
 def age_of_information(
@@ -73,19 +74,31 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
 
     Both phases are broadcasts (IV-C), or the second answers the first (Alg. 1).
     """
-    sent, delivered, overheard, heard, receptions = _count(phases[0])
-    later, answered, overheard_later, heard_later, receptions_later = _count(phases[1])
-    none = np.full_like(sent, np.nan)
+    first, second = _count(phases[0]), _count(phases[1])
+    transmitted = first.sent + second.sent
+    none = np.full_like(transmitted, np.nan)
+    if is_broadcast:
+        return Packets(
+            sent=transmitted,
+            transmitted=transmitted,
+            attempted=none,
+            delivered=none,
+            lost=none,
+            overheard=none,
+            answered=none,
+            heard=first.heard + second.heard,
+            receptions=first.receptions + second.receptions,
+        )
     return Packets(
-        sent=sent + later if is_broadcast else sent,
-        transmitted=sent + later,
-        attempted=none if is_broadcast else sent,
-        delivered=none if is_broadcast else delivered,
-        lost=none if is_broadcast else sent - delivered,
-        overheard=none if is_broadcast else overheard + overheard_later,
-        answered=none if is_broadcast else answered,
-        heard=heard + heard_later if is_broadcast else none,
-        receptions=receptions + receptions_later if is_broadcast else none,
+        sent=first.sent,
+        transmitted=transmitted,
+        attempted=first.sent,
+        delivered=first.delivered,
+        lost=first.sent - first.delivered,
+        overheard=first.overheard + second.overheard,
+        answered=second.delivered,
+        heard=none,
+        receptions=none,
     )
 
 
@@ -165,27 +178,41 @@ def _mean_age(
     return age, is_complete
 
 
+class _PhaseCounts(NamedTuple):
+    """The packets of one phase [packets]; names as in `Packets`."""
+
+    sent: Float[np.ndarray, "B"]
+    delivered: Float[np.ndarray, "B"]
+    overheard: Float[np.ndarray, "B"]
+    heard: Float[np.ndarray, "B"]
+    receptions: Float[np.ndarray, "B"]
+
+
 @compiled()
-def _count(phase: Phase) -> tuple[Float[np.ndarray, "B"], ...]:
-    """Return the packets of one phase: sent, delivered, overheard, heard, and receptions."""
+def _count(phase: Phase) -> _PhaseCounts:
     recipient, heard = phase
     num_missions, num_robots = recipient.shape
-    sent, delivered = np.zeros(num_missions), np.zeros(num_missions)
-    overheard, num_heard, receptions = sent.copy(), sent.copy(), sent.copy()
+    counts = _PhaseCounts(
+        np.zeros(num_missions),
+        np.zeros(num_missions),
+        np.zeros(num_missions),
+        np.zeros(num_missions),
+        np.zeros(num_missions),
+    )
     is_heard = np.empty(num_robots, dtype=np.bool_)
     for b in range(num_missions):
         is_heard[:] = False
         for i in range(num_robots):
-            sent[b] += recipient[b, i] != i
+            counts.sent[b] += recipient[b, i] != i
             sender = heard[b, i]
             if sender != i:
                 is_meant = recipient[b, sender] == i
-                delivered[b] += is_meant
-                overheard[b] += not is_meant
-                num_heard[b] += not is_heard[sender]
-                receptions[b] += 1
+                counts.delivered[b] += is_meant
+                counts.overheard[b] += not is_meant
+                counts.heard[b] += not is_heard[sender]
+                counts.receptions[b] += 1
                 is_heard[sender] = True
-    return sent, delivered, overheard, num_heard, receptions
+    return counts
 
 
 @compiled()

@@ -10,10 +10,10 @@ import math
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.buffers import NEVER, NO_PARENT, Buffers
+from swarm_mj.protocol.buffers import ABSENT, NEVER, NO_PARENT, Buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.compiled import compiled
 
@@ -198,20 +198,16 @@ def with_room(buffers: Buffers, num_entries: int) -> Buffers:
     return PartialBuffers(**vars(buffers), num_entries=num_entries, last_sent=last_sent)
 
 
-def entries_sent(
-    buffers: Buffers, recipient: Int[np.ndarray, "B N"]
-) -> Bool[np.ndarray, "B N N"] | None:
-    """Choose the entries that everyone sends in this slot (II-B), and note them; None is all.
+def entries_sent(buffers: Buffers, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N N"]:
+    """Choose the entries that everyone sends in this slot (II-B), and note them; return their T.
 
     A robot always sends its own entry, and then those whose T has risen most since it last sent
-    them; ties go to the freshest. So every entry gets its turn. True at `[b, i, k]` where i's
-    packet has an entry of k.
+    them; ties go to the freshest. So every entry gets its turn. `ABSENT` at `[b, i, k]` where i's
+    packet has no entry of k.
     """
     if not isinstance(buffers, PartialBuffers):
-        return None
-    is_sent = np.zeros(buffers.timestamp.shape, dtype=np.bool_)
-    _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent, is_sent)
-    return is_sent
+        return buffers.timestamp
+    return _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent)
 
 
 def _num_bits(fields: tuple[PacketField, ...]) -> int:
@@ -224,9 +220,9 @@ def _choose(
     recipient: Int[np.ndarray, "B N"],
     num_entries: int,
     last_sent: Float[np.ndarray, "B N N"],
-    is_sent: Bool[np.ndarray, "B N N"],
-) -> None:
+) -> Float[np.ndarray, "B N N"]:
     num_missions, num_robots = recipient.shape
+    sent = np.full_like(timestamp, ABSENT)
     for b in range(num_missions):
         for i in range(num_robots):
             if recipient[b, i] == i:
@@ -235,5 +231,5 @@ def _choose(
             urgency[i] = np.inf
             for k in np.argsort(-urgency)[:num_entries]:
                 if timestamp[b, i, k] > NEVER:
-                    is_sent[b, i, k] = True
-                    last_sent[b, i, k] = timestamp[b, i, k]
+                    sent[b, i, k] = last_sent[b, i, k] = timestamp[b, i, k]
+    return sent

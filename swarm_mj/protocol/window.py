@@ -90,8 +90,10 @@ class RequestResponse:
 
         Decisions are trusted; a user's own channel is checked (`checked_decode`).
         """
-        recipient, noted = decide(()), self.silence_is_attempt
-        return window(buffers, move(), recipient, channel, now, silence_is_attempt=noted)
+        recipient = decide(())
+        states = move()
+        noted = self.silence_is_attempt
+        return window(buffers, states, recipient, channel, now, silence_is_attempt=noted)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,15 +118,18 @@ class DoubleBroadcast:
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, Phase]:
         """Play one window; arguments as in `RequestResponse`."""
+        noted = self.silence_is_attempt
         recipient = self._addressed(decide(()))
-        states, t, noted = move(), now + SLOT_WINDOWS, self.silence_is_attempt
+        states = move()
+        t = now + SLOT_WINDOWS
         first = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
 
         recipient = self._addressed(decide((first,)))
         if self.moves_each_slot:
             states = move()
         t = now + 2.0 * SLOT_WINDOWS
-        return first, transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
+        second = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
+        return first, second
 
     def _addressed(self, recipient: Int[np.ndarray, "B N"]) -> Int[np.ndarray, "B N"]:
         if not self.needs_addressees:
@@ -150,14 +155,11 @@ def window(
     Buffers are written in place; `states` are true, and fixed during the window; the clock shows
     the start of the window [windows]. Silence may count as addressing oneself (Eq. 7).
     """
-    now = now + SLOT_WINDOWS
-    transmission = transmit(
-        buffers, states, recipient, channel, now, silence_is_attempt=silence_is_attempt
-    )
+    t, noted = now + SLOT_WINDOWS, silence_is_attempt
+    transmission = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
 
-    now = now + SLOT_WINDOWS
-    observe_self(buffers, states, now)
-    response = _send(buffers, states, respondents(transmission), channel, now)
+    t = now + 2.0 * SLOT_WINDOWS
+    response = respond(buffers, states, transmission, channel, t)
     return transmission, response
 
 
@@ -170,13 +172,25 @@ def transmit(
     *,
     silence_is_attempt: bool = False,
 ) -> Phase:
-    """Play one slot of transmissions (III-B, IV-C); arguments as in `window`, t of this slot.
+    """Play one slot of transmissions (III-B, IV-C); arguments as in `window`, t at its end.
 
     Robots that transmit address a teammate or, with BROADCAST, everyone.
     """
     observe_self(buffers, states, now)
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
     return _send(buffers, states, recipient, channel, now)
+
+
+def respond(
+    buffers: Buffers,
+    states: RobotStates,
+    transmission: Phase,
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+) -> Phase:
+    """Play the slot in which the robots addressed answer (III-B); arguments as in `transmit`."""
+    observe_self(buffers, states, now)
+    return _send(buffers, states, respondents(transmission), channel, now)
 
 
 @compiled()

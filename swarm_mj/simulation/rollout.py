@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import PACKETS, TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import PACKET_COUNTS, TaskCost, WindowCosts, mean_hops
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.fields import check_kind
 
@@ -82,7 +82,7 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
     first_complete = np.argmax(is_complete, axis=0) + 1.0
     packets = {
         name: np.sum([getattr(window.costs.packets, name) for window in flown], axis=0)
-        for name in PACKETS
+        for name in PACKET_COUNTS
     }
     receptions = packets.pop("receptions")
     num_sent = np.where(packets["sent"] > 0, packets["sent"], np.nan)

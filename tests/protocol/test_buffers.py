@@ -115,17 +115,6 @@ def test_eq8_merges_as_by_loops(seed, num_missions, num_robots):
     assert same(buffers, expected)
 
 
-def test_the_parent_is_the_first_robot_the_news_was_passed_to():
-    # Robot 2 tells 1, and then 1 tells 0: robot 2 first passed its news to 1, and 1 its own to 0.
-    buffers = empty_buffers(1, 3)
-    nothing = RobotStates(position_m=np.zeros((1, 3, 2)), velocity_mps=np.zeros((1, 3, 2)))
-    for half, heard in [(1, [0, 2, 2]), (2, [1, 1, 2])]:
-        observe_self(buffers, nothing, np.array([half / 2]))
-        merge(buffers, np.array([heard]))
-    assert buffers.timestamp[0].tolist() == [[1.0, 1.0, 0.5], [0.0, 1.0, 0.5], [0.0, 0.0, 1.0]]
-    assert buffers.parent[0].tolist() == [[-1, 0, 1], [-1, -1, 1], [-1, -1, -1]]
-
-
 def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():
     states = RobotStates(
         position_m=np.array([[[1.0, 2.0], [3.0, 4.0]]]),
@@ -141,13 +130,3 @@ def test_what_is_granted_of_the_start_is_known_and_as_old_as_the_mission():
         np.testing.assert_array_equal(buffers.position_m[:, i], states.position_m)
         np.testing.assert_array_equal(buffers.velocity_mps[:, i], states.velocity_mps)
     assert (buffers.parent == NO_PARENT).all()
-
-
-def test_eq8_the_first_packet_replaces_what_was_granted():
-    states = RobotStates(position_m=np.ones((1, 2, 2)), velocity_mps=np.ones((1, 2, 2)))
-    buffers = empty_buffers(1, 2)
-    grant_start(buffers, states)
-    observe_self(buffers, states, np.array([0.5]))
-    merge(buffers, np.array([[0, 0]]))
-    assert buffers.timestamp[0].tolist() == [[0.5, 0.0], [0.5, 0.5]]
-    assert buffers.parent[0].tolist() == [[NO_PARENT, NO_PARENT], [1, NO_PARENT]]

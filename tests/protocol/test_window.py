@@ -14,10 +14,8 @@ from swarm_mj.protocol.buffers import BROADCAST, empty_buffers, merge, observe_s
 from swarm_mj.protocol.window import (
     DoubleBroadcast,
     LocalViews,
-    Phase,
     RequestResponse,
     channel_at,
-    respondents,
     transmit,
     window,
 )
@@ -140,21 +138,6 @@ def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_list
         answers = alg1(robots, states, addressed, twin, float(t))
         assert response.recipient[0].tolist() == [answers.get(j, j) for j in range(num_robots)]
         assert_same_knowledge(robots, buffers)
-
-
-def test_alg1_respondents_by_hand():
-    # 0 asks 1; 2 overhears it and stays silent; 3 asks 4, which decodes nothing; 5 is alone.
-    phase = Phase(recipient=np.array([[1, 1, 2, 4, 4, 5]]), heard=np.array([[0, 0, 0, 3, 4, 5]]))
-    assert respondents(phase).tolist() == [[0, 0, 2, 3, 4, 5]]
-
-
-def test_alg1_a_window_by_hand():
-    # 0 asks 1, which answers: half a window apart, both times with the sender's own time.
-    buffers = empty_buffers(1, 3)
-    window(buffers, standing(3), np.array([[1, 1, 2]]), to_the_addressee, np.array([6.0]))
-    assert buffers.timestamp[0].tolist() == [[7.0, 7.0, 0.0], [6.5, 7.0, 0.0], [0.0, 0.0, 7.0]]
-    assert buffers.parent[0].tolist() == [[-1, 0, -1], [1, -1, -1], [-1, -1, -1]]
-    assert buffers.last_attempt[0].tolist() == [[0.0, 6.5, 0.0], [0.0] * 3, [0.0] * 3]
 
 
 def test_alg1_silence_counts_as_attempt_when_told_so():

@@ -197,13 +197,6 @@ def test_powers_are_computed_once_for_each_sender_and_place():
     assert np.all(powers[1] >= 0.0)
 
 
-def test_rows_may_be_any_missions_and_repeat_them():
-    made, position_m = gains(), places()
-    mission = np.array([1, 0, 1])
-    rows = made.received_mw(position_m[mission], mission, np.ones((3, 4), dtype=bool)).copy()
-    np.testing.assert_array_equal(rows, gains().received_mw(position_m, np.arange(2), EVERYONE))
-
-
 def test_moving_back_finds_the_same_shadowing():
     made, there, here = gains(**SHADOWED), *map(places, (1, 2))
     first = made.received_mw(there, np.arange(2), EVERYONE).copy()
