@@ -192,13 +192,8 @@ class _PhaseCounts(NamedTuple):
 def _count(phase: Phase) -> _PhaseCounts:
     recipient, heard = phase
     num_missions, num_robots = recipient.shape
-    counts = _PhaseCounts(
-        np.zeros(num_missions),
-        np.zeros(num_missions),
-        np.zeros(num_missions),
-        np.zeros(num_missions),
-        np.zeros(num_missions),
-    )
+    none = np.zeros(num_missions)
+    counts = _PhaseCounts(none, none.copy(), none.copy(), none.copy(), none.copy())
     is_heard = np.empty(num_robots, dtype=np.bool_)
     for b in range(num_missions):
         is_heard[:] = False

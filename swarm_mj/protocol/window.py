@@ -90,9 +90,9 @@ class RequestResponse:
 
         Decisions are trusted; a user's own channel is checked (`checked_decode`).
         """
+        noted = self.silence_is_attempt
         recipient = decide(())
         states = move()
-        noted = self.silence_is_attempt
         return window(buffers, states, recipient, channel, now, silence_is_attempt=noted)
 
 
@@ -155,11 +155,13 @@ def window(
     Buffers are written in place; `states` are true, and fixed during the window; the clock shows
     the start of the window [windows]. Silence may count as addressing oneself (Eq. 7).
     """
-    t, noted = now + SLOT_WINDOWS, silence_is_attempt
-    transmission = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
+    t = now + SLOT_WINDOWS
+    transmission = transmit(
+        buffers, states, recipient, channel, t, silence_is_attempt=silence_is_attempt
+    )
 
     t = now + 2.0 * SLOT_WINDOWS
-    response = respond(buffers, states, transmission, channel, t)
+    response = exchange(buffers, states, respondents(transmission), channel, t)
     return transmission, response
 
 
@@ -176,21 +178,27 @@ def transmit(
 
     Robots that transmit address a teammate or, with BROADCAST, everyone.
     """
-    observe_self(buffers, states, now)
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    return _send(buffers, states, recipient, channel, now)
+    return exchange(buffers, states, recipient, channel, now)
 
 
-def respond(
+def exchange(
     buffers: Buffers,
     states: RobotStates,
-    transmission: Phase,
+    recipient: Int[np.ndarray, "B N"],
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
 ) -> Phase:
-    """Play the slot in which the robots addressed answer (III-B); arguments as in `transmit`."""
+    """Let everyone observe itself, send its packet over the channel and merge what it decodes.
+
+    Arguments are as in `transmit`; a response is no attempt (Alg. 1).
+    """
     observe_self(buffers, states, now)
-    return _send(buffers, states, respondents(transmission), channel, now)
+    sent_to = of_active(states.is_active, recipient)
+    heard = checked_decode(channel_at(channel, now), states.position_m, sent_to)
+    heard = of_active(states.is_active, heard)
+    merge(buffers, heard, entries_sent(buffers, sent_to))
+    return Phase(recipient=sent_to.copy(), heard=heard)
 
 
 @compiled()
@@ -219,21 +227,6 @@ def channel_at(
         return channel
     slot = np.rint(now * SLOTS_PER_WINDOW).astype(np.int64) - 1
     return channel.at(slot, np.arange(len(now)) if mission is None else mission)
-
-
-def _send(
-    buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-) -> Phase:
-    """Send everyone's packet through the channel (Eq. 6) and merge what was decoded."""
-    sent_to = of_active(states.is_active, recipient)
-    heard = checked_decode(channel_at(channel, now), states.position_m, sent_to)
-    heard = of_active(states.is_active, heard)
-    merge(buffers, heard, entries_sent(buffers, sent_to))
-    return Phase(recipient=sent_to.copy(), heard=heard)
 
 
 def of_active(

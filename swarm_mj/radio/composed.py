@@ -21,13 +21,7 @@ from swarm_mj.radio.fading import (
     link_key,
     mixed,
 )
-from swarm_mj.radio.power_law import (
-    MeanPowers,
-    PowerLaw,
-    compute_powers,
-    no_powers,
-    place_robots,
-)
+from swarm_mj.radio.power_law import MeanPowers, PowerLaw, compute_powers, no_powers, place_robots
 from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
 from swarm_mj.system.compiled import compiled
 

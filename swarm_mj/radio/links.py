@@ -12,12 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import DB_PER_NEPER, FreeSpaceRadio
-from swarm_mj.radio.power_law import (
-    FREE_SPACE_EXPONENT,
-    PowerLaw,
-    free_space_law,
-    powers_between,
-)
+from swarm_mj.radio.power_law import FREE_SPACE_EXPONENT, PowerLaw, free_space_law, powers_between
 from swarm_mj.radio.reception import (
     MIN_DISTANCE_M,
     NOBODY,

@@ -87,19 +87,11 @@ def write_powers(
     i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
     """Fill `power`: the mean power of i's packets at every robot; nobody receives itself."""
-    write_path_loss(i, position_m, law, power)
-    obstruct(i, position_m, ROBOT_HEIGHT_M, law.obstacles, power)
-
-
-@compiled()
-def write_path_loss(
-    i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
-) -> None:
-    """Fill `power` as in an area without obstacles."""
     for j in range(position_m.shape[0]):
         apart_m2 = squared_distance(position_m, i, j)
         power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)
     power[i] = 0.0
+    obstruct(i, position_m, ROBOT_HEIGHT_M, law.obstacles, power)
 
 
 @compiled()
@@ -120,11 +112,9 @@ def compute_powers(powers: MeanPowers, b: int, i: int, waves: Waves | None = Non
     """Make sure of the powers of i's packets in mission b, whose robots have been placed."""
     if not powers.is_done[b, i]:
         powers.is_done[b, i] = True
-        position_m, power = powers.position_m[b], powers.power[b, i]
-        write_path_loss(i, position_m, powers.law, power)
+        write_powers(i, powers.position_m[b], powers.law, powers.power[b, i])
         if waves is not None:
-            shadow(waves, b, i, power)
-        obstruct(i, position_m, ROBOT_HEIGHT_M, powers.law.obstacles, power)
+            shadow(waves, b, i, powers.power[b, i])
 
 
 @compiled()

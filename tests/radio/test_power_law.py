@@ -7,12 +7,7 @@ import pytest
 from walls import walls
 
 from swarm_mj.radio.free_space import path_loss_db
-from swarm_mj.radio.power_law import (
-    PowerLaw,
-    power_after,
-    powers_between,
-    two_ray_breakpoint_m,
-)
+from swarm_mj.radio.power_law import PowerLaw, power_after, powers_between, two_ray_breakpoint_m
 
 PLACES_M = np.array([[-30.0, 0.0], [-40.0, 0.0], [30.0, 40.0]])
 

@@ -10,11 +10,7 @@ from walls import walls
 from swarm_mj.mission import paper
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.power_law import no_powers
-from swarm_mj.radio.spatial_reuse import (
-    believes_as_the_last,
-    keep_joined,
-    write_joined,
-)
+from swarm_mj.radio.spatial_reuse import believes_as_the_last, keep_joined, write_joined
 
 seeds = st.integers(0, 2**32 - 1)
 thresholds = st.sampled_from([0.3, 1.25, 4.0])
