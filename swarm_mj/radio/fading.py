@@ -26,10 +26,12 @@ from swarm_mj.system.compiled import compiled
 NO_LINE_OF_SIGHT = 0.0  # K of Rayleigh fading, linear
 NO_FADING = math.inf  # K without scattered waves, linear
 
+# All unsigned: of a signed and an unsigned integer numba makes a float.
 _WEYL = np.uint64(0x9E3779B97F4A7C15)  # SplitMix64's increment: 2^64 over the golden ratio
 _MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-_S27, _S30, _S31, _S11 = np.uint64(27), np.uint64(30), np.uint64(31), np.uint64(11)
-_UNIT = 2.0**-53
+_SHIFT_27, _SHIFT_30, _SHIFT_31 = np.uint64(27), np.uint64(30), np.uint64(31)
+_SPARE_BITS = np.uint64(11)  # of 64, beyond those of a float's mantissa
+_UNIT = 2.0**-53  # the last of these
 NUM_WAVES = 64
 STEPS_PER_CORRELATION = 10.0  # places within that share of d_corr count as one
 
@@ -42,15 +44,15 @@ NUM_ENDS = 4
 def mixed(key: np.uint64, number: np.uint64) -> np.uint64:
     """Return a key that also depends on a number."""
     z = (key ^ number) + _WEYL
-    z = (z ^ (z >> _S30)) * _MIX_1
-    z = (z ^ (z >> _S27)) * _MIX_2
-    return z ^ (z >> _S31)
+    z = (z ^ (z >> _SHIFT_30)) * _MIX_1
+    z = (z ^ (z >> _SHIFT_27)) * _MIX_2
+    return z ^ (z >> _SHIFT_31)
 
 
 @compiled()
 def keyed_uniform(key: np.uint64) -> float:
     """Return a uniform number in (0, 1), the same for the same key."""
-    return (float(key >> _S11) + 0.5) * _UNIT
+    return (float(key >> _SPARE_BITS) + 0.5) * _UNIT
 
 
 @compiled()

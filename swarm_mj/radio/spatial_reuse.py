@@ -21,10 +21,14 @@ FREE_SPACE = np.zeros((0, 0))  # in place of powers
 
 
 class _Belief(NamedTuple):
-    """The powers in which one robot believes, apart from `_Slot`: loops then copy fewer arrays."""
+    """The powers in which one robot believes, apart from `_Slot`: loops then copy fewer arrays.
+
+    In free space there is no table of powers: nearly all robots are refused after a few of them, so
+    that tables, which hold whole rows, would take ten times as long.
+    """
 
     believed_m: Float[np.ndarray, "N 2"]
-    at_1_m: float  # in free space, where nearly all pairs are judged by few of them: no table then
+    at_1_m: float  # in free space
     power: Float[np.ndarray, "N N"]  # by a law, rows as far as they are computed
     threshold: float
 

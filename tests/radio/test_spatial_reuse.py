@@ -32,7 +32,7 @@ def test_eq3_those_who_may_send_and_join_do(seed, num_robots, threshold):
 
 
 @given(seed=seeds, num_robots=st.integers(2, 12), threshold=thresholds)
-def test_eq3_each_robot_reckons_with_its_own_beliefs(seed, num_robots, threshold):
+def test_eq3_each_robot_goes_by_its_own_beliefs(seed, num_robots, threshold):
     """Robot i believes in places of its own, and the order is that of identities."""
     rng = np.random.default_rng(seed)
     believed_m = rng.uniform(-500, 500, (1, num_robots, num_robots, 2))
@@ -62,9 +62,7 @@ WALLS = walls(10**-1.5, 0, 1)  # 15 dB each
 
 
 @given(seed=seeds, num_robots=st.integers(2, 12), stands_still=st.booleans())
-def test_eq3_by_what_was_known_powers_the_channel_its_own_rule_is_the_judge(
-    seed, num_robots, stands_still
-):
+def test_eq3_by_granted_powers_the_channel_itself_is_the_judge(seed, num_robots, stands_still):
     """Steeper path loss, strong radios and walls, all of them known; slot after slot."""
     rng = np.random.default_rng(seed)
     mission = paper(
@@ -88,7 +86,7 @@ def test_eq3_by_what_was_known_powers_the_channel_its_own_rule_is_the_judge(
         assert set(np.flatnonzero(is_sending[0]).tolist()) == expected
 
 
-def test_each_robot_reckons_with_its_own_beliefs_of_what_it_was_told():
+def test_by_granted_powers_too_each_robot_goes_by_its_own_beliefs():
     """Robot 2 takes itself to be far from the owner of the turn, and joins; the others know it."""
     mission = paper("stationary", num_robots=4, prior_knowledge="statistics", path_loss="two-ray")
     belief = mission_radio(mission).belief
