@@ -1,7 +1,5 @@
 """Fig. 2: a flock at its start and at its end, by the velocities of its robots."""
 
-from typing import NamedTuple
-
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
@@ -14,6 +12,7 @@ from matplotlib.ticker import MultipleLocator
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE
 from swarm_mj.mission import PAPERS, Mission
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import velocity_variance
 from swarm_mj.simulation.rollout import rollout
@@ -25,27 +24,19 @@ MARGIN_M = 150.0  # around the robots, for their arrows
 KM = 1000.0
 
 
-class Snapshot(NamedTuple):
-    """A team at one moment."""
-
-    time_s: float
-    position_m: Float[np.ndarray, "N 2"]
-    velocity_mps: Float[np.ndarray, "N 2"]
-
-    @property
-    def disagreement_mps(self) -> Float[np.ndarray, "N"]:
-        """The distance of each robot's velocity from the team's mean."""
-        return np.linalg.norm(self.velocity_mps - np.mean(self.velocity_mps, axis=0), axis=1)
-
-
-def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[Snapshot, Snapshot]:
+def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[RobotStates, RobotStates]:
     """Return the team before and after a mission; raise ValueError for no policy or no seed."""
     policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
-    start = Snapshot(0.0, swarm.states.position_m[0], swarm.states.velocity_mps[0])
+    start = swarm.states
     for _ in rollout(swarm, policy):
         pass
-    end_s = float(swarm.now[0]) * mission.window_s
-    return start, Snapshot(end_s, swarm.states.position_m[0], swarm.states.velocity_mps[0])
+    return start, swarm.states
+
+
+def disagreement_mps(team: RobotStates) -> Float[np.ndarray, "N"]:
+    """Return the distance of each robot's velocity from the team's mean."""
+    velocity_mps = team.velocity_mps[0]
+    return np.linalg.norm(velocity_mps - np.mean(velocity_mps, axis=0), axis=1)
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
@@ -55,16 +46,17 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     `fly_flock` does.
     """
     mission = PAPERS[preset]("flocking")
-    teams = fly_flock(mission, policy_name, seed)
+    start, end = fly_flock(mission, policy_name, seed)
+    moments = {0.0: start, mission.num_windows * mission.window_s: end}
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, 4.2))
         *panels, bar = drawing.subplots(1, 3, width_ratios=[1.0, 1.0, 0.04])
         drawing.subplots_adjust(left=0.08, right=0.925, top=0.8, bottom=0.18, wspace=0.12)
-        largest_mps = float(np.max(teams[0].disagreement_mps))
+        largest_mps = float(np.max(disagreement_mps(start)))
         colours = ScalarMappable(Normalize(0.0, largest_mps), "viridis")
-        for axes, team in zip(panels, teams, strict=True):
-            _draw(axes, mission, team, colours)
-            _frame(axes, np.concatenate([team.position_m for team in teams]))
+        for axes, (time_s, team) in zip(panels, moments.items(), strict=True):
+            _draw(axes, mission, time_s, team, colours)
+            _frame(axes, np.concatenate([start.position_m[0], end.position_m[0]]))
         panels[0].set_ylabel("y [km]")
         panels[1].tick_params(labelleft=False)
         drawing.colorbar(colours, cax=bar, label="distance from the team's mean velocity [m/s]")
@@ -74,20 +66,24 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     return drawing
 
 
-def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable) -> None:
+def _draw(
+    axes: Axes, mission: Mission, time_s: float, team: RobotStates, colours: ScalarMappable
+) -> None:
     """Draw one moment; each panel has its own scale of arrows, shown by its key."""
-    fastest_mps = float(np.max(np.linalg.norm(team.velocity_mps, axis=1)))
+    fastest_mps = float(np.max(np.linalg.norm(team.velocity_mps[0], axis=1)))
     corner, side = -mission.half_side_m / KM, mission.side_m / KM
     area = Rectangle((corner, corner), side, side, fill=False, color=FAINT, linewidth=0.6)
     area.set_linestyle((0, (4, 4)))
     axes.add_patch(area)
-    x, y = team.position_m.T / KM
-    colour = colours.to_rgba(team.disagreement_mps)
+    x, y = team.position_m[0].T / KM
+    velocity_x, velocity_y = team.velocity_mps[0].T
+    colour = colours.to_rgba(disagreement_mps(team))
     axes.scatter(x, y, s=9.0, color=colour, zorder=3)
     arrows = axes.quiver(
         x,
         y,
-        *team.velocity_mps.T,
+        velocity_x,
+        velocity_y,
         color=colour,
         scale=fastest_mps / ARROW_SHARE,
         scale_units="width",
@@ -96,8 +92,8 @@ def _draw(axes: Axes, mission: Mission, team: Snapshot, colours: ScalarMappable)
     )
     key_mps = float(f"{fastest_mps:.1g}")
     axes.quiverkey(arrows, 0.8, 1.11, key_mps, f"{key_mps:g} m/s", labelpos="E", color=FAINT)
-    variance = _power(float(velocity_variance(team.velocity_mps[None])[0]))
-    axes.set_title(f"after {team.time_s:g} s\nvelocity variance {variance} m²/s²")
+    variance = _power(float(velocity_variance(team.velocity_mps)[0]))
+    axes.set_title(f"after {time_s:g} s\nvelocity variance {variance} m²/s²")
     axes.set_xlabel("x [km]")
 
 

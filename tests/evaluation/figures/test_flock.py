@@ -5,8 +5,9 @@ import pytest
 from matplotlib.quiver import Quiver
 
 from swarm_mj.evaluation.figures import flock
-from swarm_mj.evaluation.figures.flock import Snapshot, draw_flock, fly_flock
+from swarm_mj.evaluation.figures.flock import disagreement_mps, draw_flock, fly_flock
 from swarm_mj.mission import paper
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
@@ -17,15 +18,15 @@ MISSION = paper("flocking", num_robots=6, num_windows=20, range_ratio=1.0)
 def test_start_and_end_are_the_swarms():
     start, end = fly_flock(MISSION, "round-robin", 5)
     swarm = Swarm(MISSION, [5])
-    np.testing.assert_array_equal(start.position_m, swarm.states.position_m[0])
-    np.testing.assert_array_equal(start.velocity_mps, swarm.states.velocity_mps[0])
+    np.testing.assert_array_equal(start.position_m, swarm.states.position_m)
+    np.testing.assert_array_equal(start.velocity_mps, swarm.states.velocity_mps)
     for _ in rollout(swarm, make_policy("round-robin", MISSION)):
         pass
-    np.testing.assert_array_equal(end.position_m, swarm.states.position_m[0])
-    np.testing.assert_array_equal(end.velocity_mps, swarm.states.velocity_mps[0])
-    assert (start.time_s, end.time_s) == (0.0, 2.0)  # 20 windows of 100 ms
-    apart = [np.hypot(*(v - sum(start.velocity_mps) / 6)) for v in start.velocity_mps]
-    np.testing.assert_allclose(start.disagreement_mps, apart)
+    np.testing.assert_array_equal(end.position_m, swarm.states.position_m)
+    np.testing.assert_array_equal(end.velocity_mps, swarm.states.velocity_mps)
+    (velocity_mps,) = start.velocity_mps
+    apart = [np.hypot(*(each - sum(velocity_mps) / 6)) for each in velocity_mps]
+    np.testing.assert_allclose(disagreement_mps(start), apart)
 
 
 def test_arrows_stand_at_the_robots_and_point_where_they_go():
@@ -60,10 +61,9 @@ def test_both_panels_show_the_same_square_with_units_and_the_caption_says_what_w
 def test_variances_have_two_digits_by_hand(monkeypatch):
     """Two robots, 3.5 m/s off their mean: 12.25 m²/s². Then 0.00035 m/s: 1.225e-7 m²/s²."""
     teams = [
-        Snapshot(
-            time_s=0.0,
-            position_m=np.array([[-100.0, 0.0], [100.0, 0.0]]),
-            velocity_mps=np.array([[1.0 - apart_mps, 0.0], [1.0 + apart_mps, 0.0]]),
+        RobotStates(
+            position_m=np.array([[[-100.0, 0.0], [100.0, 0.0]]]),
+            velocity_mps=np.array([[[1.0 - apart_mps, 0.0], [1.0 + apart_mps, 0.0]]]),
         )
         for apart_mps in (3.5, 0.00035)
     ]

@@ -54,7 +54,7 @@ class Neighbour(IntEnum):
     MARGIN_NOW = 1  # of a packet to it beside those that are due
     TRANSMITS = 2  # whether it is due itself
     NEXT_DUE = 3  # in how many slots it is
-    MARGIN_OF_OTHER = 4  # of what it inbound_ratio otherwise
+    MARGIN_OF_OTHER = 4  # of what it receives otherwise
     IS_JAMMED = 5  # whether it would lose that
     NEWS = 6  # what it would learn from this robot
     NEWS_OF_OTHER = 7  # and from the other
