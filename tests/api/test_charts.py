@@ -67,3 +67,4 @@ def test_one_mission_has_no_interval_and_flocks_have_velocities():
     age, variance = swarm_mj.evaluate("tdma", num_missions=1, **SHORT).plot().axes
     assert len(age.collections) == 0
     assert len(variance.lines) == 1
+    assert age.get_shared_y_axes().joined(age, variance)
