@@ -20,36 +20,14 @@ from swarm_mj.replay.rerun_log import RerunLog
 TREE_WIDTH, TREE_HEIGHT = 600.0, 400.0  # of the tree's view, in its own units
 RATE_WINDOWS = 10  # that packets are counted over
 
-# What a robot does with its radio in a window, and the colour of its lane meanwhile.
-SILENT = "silent"
-BROADCAST_STATES = {
-    SILENT: palette.BACKGROUND,
-    "hears": palette.RANGE,
-    "transmits": palette.BROADCAST,
-}
-ADDRESSED_STATES = {
-    SILENT: palette.BACKGROUND,
-    "overhears": palette.OVERHEARD,
-    "answers": palette.ANSWERED,
-    "is lost": palette.LOST,
-    "delivers": palette.DELIVERED,
-}
-# The fates that are counted, and the colours of their curves.
-COUNTED = {
-    "delivered": palette.DELIVERED,
-    "lost": palette.LOST,
-    "overheard": palette.OVERHEARD,
-    "answered": palette.ANSWERED,
-}
-
 
 def draw_tree(out: RerunLog) -> None:
     """Draw the ego robot's parent tree as a dendrogram, nodes in the colours of their ages."""
     log = out.log
-    is_known, everywhere = ~np.isnan(log.known_age), np.ones_like(log.is_on)
     # Robots that are off, too: what is known of them may still be passed on.
-    colours = palette.robot_colours(log.known_age, log.facts.full_scale, everywhere, log.ego)
-    place = dendrogram(log.parent, is_known, log.ego)
+    shown = np.ones_like(log.is_on)
+    colours = palette.robot_colours(log.known_age, log.facts.full_scale, shown, log.ego)
+    place = dendrogram(log.parent, ~np.isnan(log.known_age), log.ego)
     max_hops = max(4.0, float(np.nanmax(place[..., 0])))
     place *= (TREE_WIDTH / max_hops, TREE_HEIGHT)
     across = np.arange(1, int(max_hops) + 1) * (TREE_WIDTH / int(max_hops))
@@ -118,13 +96,15 @@ def draw_age_matrix(out: RerunLog) -> None:
 
 def draw_states(out: RerunLog) -> None:
     """Draw a lane per robot: what it did with the radio, logged when it changes."""
-    colours = BROADCAST_STATES if out.log.facts.is_broadcast else ADDRESSED_STATES
-    names, state = np.array(list(colours)), radio_states(out.log)
+    facts = out.log.facts
+    colours = palette.BROADCAST_STATES if facts.is_broadcast else palette.ADDRESSED_STATES
+    names = np.array(list(colours))
+    state = radio_states(out.log)
     # Silence is hidden: lanes would otherwise be full of it.
     configuration = rr.StateConfiguration(
         values=names,
         labels=names,
-        visible=names != SILENT,
+        visible=names != palette.SILENT,
         colors=np.array(list(colours.values()), dtype=np.uint8),
     )
     for i, lane in enumerate(state.T):
@@ -141,13 +121,14 @@ def radio_states(log: Log) -> Shaped[np.ndarray, "T N"]:
     Sending goes before answering, answering before hearing.
     """
     robots = np.arange(log.recipient.shape[2])
-    sends, hears = log.is_transmitter, np.any(log.heard != robots, axis=1)
+    sends = log.is_transmitter
+    hears = np.any(log.heard != robots, axis=1)
     if log.facts.is_broadcast:
-        return np.select([sends, hears], ["transmits", "hears"], SILENT)
+        return np.select([sends, hears], ["transmits", "hears"], palette.SILENT)
     delivers = np.take_along_axis(log.heard, log.recipient, axis=2)[:, 0] == robots
     answers = log.recipient[:, 1] != robots
     order = {"delivers": sends & delivers, "is lost": sends, "answers": answers, "overhears": hears}
-    return np.select(list(order.values()), list(order), SILENT)
+    return np.select(list(order.values()), list(order), palette.SILENT)
 
 
 class PlotCurve(NamedTuple):
@@ -175,15 +156,10 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
             PlotCurve("age/ego", f"{own}, mean", palette.EGO, np.mean(log.ego_age, axis=1)),
         ]
     }
-    counts, named = packet_counts(log), "delivered (green), lost (orange), answered (blue)"
+    sent = "delivered (green), lost (orange), answered (blue)"
     if log.facts.is_broadcast:
-        named = "sent (grey), heard by anyone (blue)"
-    found[f"Packets in {RATE_WINDOWS} windows: {named}"] = shown = []
-    for name, (colour, count) in counts.items():
-        # Over several windows, for the counts of single ones would hide the trend.
-        recent = np.convolve(count, np.ones(RATE_WINDOWS))[: len(count)]
-        is_hidden = name == "overheard"
-        shown.append(PlotCurve(f"radio/{name}", name, colour, recent, is_hidden=is_hidden))
+        sent = "sent (grey), heard by anyone (blue)"
+    found[f"Packets in {RATE_WINDOWS} windows: {sent}"] = _packet_curves(log)
     if log.is_compared:
         named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
         found[f"Share [%]: {named}"] = _mismatch_curves(log)
@@ -197,29 +173,36 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
     return found
 
 
-def packet_counts(log: Log) -> dict[str, tuple[Colour, Int[np.ndarray, "T"]]]:
-    """Return the colours and each window's numbers of packets by fate.
-
-    Broadcasts are sent, and heard if any robot decoded them.
-    """
-    if not log.facts.is_broadcast:
-        num, packets = len(log.window), log.packets
-        return {
-            fate: (colour, np.bincount(packets[fate].row, minlength=num))
-            for fate, colour in COUNTED.items()
+def _packet_curves(log: Log) -> list[PlotCurve]:
+    num = len(log.window)
+    if log.facts.is_broadcast:
+        row, phase, hearer = np.nonzero(is_other(log.heard))
+        heard = np.unique([row, phase, log.heard[row, phase, hearer]], axis=1)  # by anyone
+        counts = {
+            "sent": (palette.SENT, np.sum(is_other(log.recipient), axis=(1, 2))),
+            "heard": (palette.BROADCAST, np.bincount(heard[0], minlength=num)),
         }
-    row, phase, hearer = np.nonzero(is_other(log.heard))
-    is_heard = np.zeros(log.heard.shape, dtype=bool)
-    is_heard[row, phase, log.heard[row, phase, hearer]] = True
-    sent, heard = (np.sum(each, axis=(1, 2)) for each in (is_other(log.recipient), is_heard))
-    return {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, heard)}
+    else:
+        counts = {
+            fate: (colour, np.bincount(log.packets[fate].row, minlength=num))
+            for fate, colour in palette.COUNTED.items()
+        }
+    curves = []
+    for name, (colour, count) in counts.items():
+        # Over several windows, for the counts of single ones would hide the trend.
+        recent = np.convolve(count, np.ones(RATE_WINDOWS))[:num]
+        is_hidden = name == "overheard"
+        curves.append(PlotCurve(f"radio/{name}", name, colour, recent, is_hidden=is_hidden))
+    return curves
 
 
 def _mismatch_curves(log: Log) -> list[PlotCurve]:
     window = log.mismatch.window
-    at, links = window - log.window[0], by_kind(log.mismatch.links)
+    at = window - log.window[0]
+    links = by_kind(log.mismatch.links)
     num = {kind: np.bincount(its["row"], minlength=len(at)) for kind, its in links.items()}
-    num_others, num_cut_off = np.sum(log.is_on[at], axis=1) - 1, np.sum(log.is_cut_off[at], axis=1)
+    num_others = np.sum(log.is_on[at], axis=1) - 1
+    num_cut_off = np.sum(log.is_cut_off[at], axis=1)
     shares = {
         "believed, too weak": (palette.TOO_WEAK, num["too_weak"], log.num_believed),
         "works, unbelieved": (palette.UNBELIEVED, num["unbelieved"], log.num_working),
@@ -227,7 +210,8 @@ def _mismatch_curves(log: Log) -> list[PlotCurve]:
     }
     curves = []
     for name, (colour, part, of) in shares.items():
-        path, share = "world/" + name.replace(" ", "_"), 100.0 * part / np.maximum(1, of)
+        path = "world/" + name.replace(" ", "_")
+        share = 100.0 * part / np.maximum(1, of)
         curves.append(PlotCurve(path, name, colour, share, window=window))
     return curves
 

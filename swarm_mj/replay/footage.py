@@ -58,6 +58,11 @@ def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) 
     return Ground(centre_m=centre_m, reach_m=reach_m)
 
 
+def shown_ground(position_m: Positions, mission: Mission) -> Ground:
+    """Return the ground that videos show of a whole flight: tight, unless walls say where it is."""
+    return frame(position_m, mission.half_side_m, is_tight=not mission.has_walls)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Facts:
     """The constants of a mission."""

@@ -47,8 +47,10 @@ class Layout(rrb.Blueprint):
 
 def layout(log: Log, ground: Ground) -> Layout:
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
-    reach, follows = MARGIN * ground.reach_m, ", follows the team" if ground.moves else ""
-    name, height = f"Map, squares of {square_m(ground):g} m{follows}", legend_height(log)
+    reach = MARGIN * ground.reach_m
+    height = legend_height(log)
+    follows = ", follows the team" if ground.moves else ""
+    name = f"Map, squares of {square_m(ground):g} m{follows}"
     map_view = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
     across, up = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))

@@ -73,7 +73,8 @@ def fates(
         is_overheard = recipient[row, phase, speaker] != hearer
         row, phase, sender = np.nonzero(is_other(recipient))
         receiver = recipient[row, phase, sender]
-        is_decoded, is_request = heard[row, phase, receiver] == sender, phase == 0
+        is_decoded = heard[row, phase, receiver] == sender
+        is_request = phase == 0
         sent = np.stack([row, sender, receiver])
         found = {
             "overheard": received[:, is_overheard],
@@ -104,7 +105,8 @@ def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.nd
 
     They cover this share of the way to the receiver: lost packets stop short of it.
     """
-    along, way_m = np.linspace(0.0, 1.0, SEGMENTS + 1), share * (packets.end_m - packets.start_m)
+    along = np.linspace(0.0, 1.0, SEGMENTS + 1)
+    way_m = share * (packets.end_m - packets.start_m)
     span_m = np.linalg.norm(way_m, axis=1)
     # The longer the higher: packets that cross on the ground stay apart in the picture.
     height_m = base_m + 4.0 * RISE * span_m[:, None] * along * (1.0 - along)
@@ -187,7 +189,8 @@ def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]
 
 def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
     """Divide lines from start to end into pieces, as many of each [m]."""
-    start_m, way_m = lines_m[:, None, None, 0], np.diff(lines_m, axis=1)[:, None]
+    start_m = lines_m[:, None, None, 0]
+    way_m = np.diff(lines_m, axis=1)[:, None]
     return (start_m + pieces[None, :, :, None] * way_m).reshape(-1, 2, 2)
 
 

@@ -66,6 +66,18 @@ PACKETS = {
     "delivered": PacketStyle(DELIVERED),
     "answered": PacketStyle(ANSWERED),
 }
+# The fates that charts count, by their curves' colours.
+COUNTED = {"delivered": DELIVERED, "lost": LOST, "overheard": OVERHEARD, "answered": ANSWERED}
+# What a robot does with its radio in a window, if packets have an addressee and if not.
+SILENT = "silent"
+ADDRESSED_STATES = {
+    SILENT: BACKGROUND,
+    "overhears": OVERHEARD,
+    "answers": ANSWERED,
+    "is lost": LOST,
+    "delivers": DELIVERED,
+}
+BROADCAST_STATES = {SILENT: BACKGROUND, "hears": RANGE, "transmits": BROADCAST}
 # Links on which channel and belief differ, by kind, in the same order.
 MISMATCH: dict[str, Colour] = {"unbelieved": UNBELIEVED, "too_weak": dim(TOO_WEAK, 0.7)}
 

@@ -15,14 +15,15 @@ from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Facts, Footage, frame
+from swarm_mj.replay.footage import Facts, Footage, shown_ground
 from swarm_mj.replay.links import LINK, NO_MISMATCH, NUMBERS, SEGMENTS, LinkMismatch, PacketPaths
 from swarm_mj.replay.rerun_log import TIMELINE
 from swarm_mj.system.reading import open_file, read_json
 
 FACTS = "footage"  # the recording's property that holds them
 HEADER_BYTES = 12  # at the beginning of a stream
-FOOTER_BYTES, FOOTER = 32, b"RRF2FOOT\x01\x00\x00\x00"  # at its end; how the footer ends
+FOOTER_BYTES = 32  # at its end
+FOOTER = b"RRF2FOOT\x01\x00\x00\x00"  # the end of the footer
 END = (0).to_bytes(8, "little")  # the kind of a stream's last message
 FIELD = b"\xfa\x7f\x20"  # protobuf's tag of field 2047, and the length of a SHA-256
 SEAL_BYTES = HEADER_BYTES + len(END) + 8 + len(FIELD) + 32 + FOOTER_BYTES
@@ -79,7 +80,8 @@ def read_footage(path: Path) -> Footage:
     try:
         chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
         (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
-        facts, columns = read_json(text, Facts), _columns(path)
+        facts = read_json(text, Facts)
+        columns = _columns(path)
         mission = facts.mission
         age = _numbers(columns["/scene/robots age"]).reshape(-1, mission.num_robots)
         centres_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
@@ -100,7 +102,7 @@ def read_footage(path: Path) -> Footage:
             is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
             packets=_packets(columns),
             age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
-            ground=frame(position_m, mission.half_side_m, is_tight=not mission.has_walls),
+            ground=shown_ground(position_m, mission),
         )
     except (KeyError, ValueError, pa.ArrowException) as error:
         raise ValueError(
@@ -130,7 +132,8 @@ def _packets(columns: Columns) -> dict[str, PacketPaths]:
         if (strips := columns.get(f"/scene/packets/{fate} LineStrips3D:strips")) is not None:
             points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)[..., :2]
             # From the way that is drawn to the whole one.
-            start_m, way_m = points_m[:, 0], (points_m[:, -1] - points_m[:, 0]) / style.share
+            start_m = points_m[:, 0]
+            way_m = (points_m[:, -1] - start_m) / style.share
             found[fate] = PacketPaths(_rows(strips), start_m, start_m + way_m)
     return found
 
@@ -140,7 +143,8 @@ def _mismatch(columns: Columns) -> LinkMismatch:
     for kind in palette.MISMATCH:
         entity = f"/scene/world/{kind}"
         if f"{entity} margin_db" in columns:
-            window, row = _windows(columns, entity), _rows(columns[f"{entity} sender"])
+            window = _windows(columns, entity)
+            row = _rows(columns[f"{entity} sender"])
             links = np.zeros(len(row), LINK)
             links["row"], links["is_too_weak"] = row, kind == "too_weak"
             for name in NUMBERS:

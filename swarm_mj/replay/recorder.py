@@ -12,7 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
-from swarm_mj.replay.footage import Facts, Footage, frame
+from swarm_mj.replay.footage import Facts, Footage, frame, shown_ground
 from swarm_mj.replay.links import (
     NO_MISMATCH,
     LinkMismatch,
@@ -163,18 +163,23 @@ class Recorder:
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
         columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
-        window, position_m = np.arange(1, len(self._rows) + 1), columns["position_m"]
+        window = np.arange(1, len(self._rows) + 1)
         age_window = window[:: self._stride]
         # An interrupt within `add` leaves one matrix, snapshot or cost too many.
-        age, costs = np.stack(self._age[: len(age_window)]), self._task_costs[: len(window)]
+        age = np.stack(self._age[: len(age_window)])
+        costs = self._task_costs[: len(window)]
         value = np.array([cost.value[self._index] for cost in costs])
         facts = self._facts(config or {}, age)
-        recipient, heard, mission = columns["recipient"], columns["heard"], facts.mission
         return Log(
             facts=facts,
             window=window,
-            packets=fates(recipient, heard, position_m, is_broadcast=facts.is_broadcast),
-            ground=frame(position_m, mission.half_side_m, is_tight=not mission.has_walls),
+            packets=fates(
+                columns["recipient"],
+                columns["heard"],
+                columns["position_m"],
+                is_broadcast=facts.is_broadcast,
+            ),
+            ground=shown_ground(columns["position_m"], facts.mission),
             scene=self._swarm.scene,
             age_window=age_window,
             age=age,
@@ -227,12 +232,13 @@ def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
     """
     if not 0 <= index < len(swarm.now):
         raise ValueError(f"index must be from 0 to {len(swarm.now) - 1}, not {index}")
-    recorder, mission = Recorder(swarm, ego=observer, index=index), swarm.mission
+    recorder = Recorder(swarm, ego=observer, index=index)
     recorder.add()
     seen = recorder.log()
     # Darkest from a round on, in which everyone has its turn.
-    facts = replace(seen.facts, full_scale=float(mission.num_robots))
+    facts = replace(seen.facts, full_scale=float(swarm.mission.num_robots))
     # As wide wherever the team is: a live picture does not know where it will fly.
-    ground = frame(seen.position_m, mission.half_side_m)
-    ground = replace(ground, reach_m=max(mission.half_side_m, ground.reach_m))
+    half_side_m = swarm.mission.half_side_m
+    ground = frame(seen.position_m, half_side_m)
+    ground = replace(ground, reach_m=max(half_side_m, ground.reach_m))
     return replace(seen, facts=facts, ground=ground)

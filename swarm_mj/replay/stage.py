@@ -57,7 +57,8 @@ def draw_stage(out: RerunLog) -> None:
             out.fixed(f"scene/area/{name}", part)
     # On the map, where they are in the way of the antennas.
     if outlines := footprints(obstacles_of(model), ROBOT_HEIGHT_M):
-        path, apart_m = "arena/world/filling", FILL_SHARE * out.ground.reach_m
+        path = "arena/world/filling"
+        apart_m = FILL_SHARE * out.ground.reach_m
         lines = [line for outline in outlines for line in filling(outline, apart_m)]
         # The width is in metres, since rerun fills no areas.
         style: dict[str, Any] = LAYERS[path].style | {"radii": 0.55 * apart_m}
@@ -74,9 +75,10 @@ def _draw_ground(out: RerunLog, mission: Mission) -> None:
         out.timed("arena", rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors))
     else:
         out.fixed("arena", rr.Transform3D(mat3x3=MIRROR))
-    strips, half = grid(out.ground), mission.half_side_m
+    strips = grid(out.ground)
     out.fixed_layer("arena/area/grid", strips=strips)
     out.fixed_layer("scene/grid", strips=lifted(np.array(strips), GRID_M))
+    half = mission.half_side_m
     outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
     name = "walls" if mission.has_walls else "outline"
     out.fixed_layer(f"arena/area/{name}", strips=[outline])

@@ -29,10 +29,12 @@ TICKS_HZ = 100  # a GIF counts in hundredths of a second
 MIN_TICKS = 2  # viewers show what is shorter much longer
 MAX_MISSIONS = 2  # side by side
 
-# Fits of measured peaks and files. In memory: MuJoCo, OpenGL and the encoder; each pixel's buffers
-# in them; a pixel of each of a GIF's pictures. On disk: the file's frame, and each pixel drawn.
-DRAWING_BYTES, PIXEL_BYTES, KEPT_PIXEL_BYTES = 3.0 * LIBRARIES, 130.0, 1.5
-FILE_BYTES, FILE_PIXEL_BYTES = 0.1e6, 0.05
+# Fits of measured peaks and files.
+DRAWING_BYTES = 3.0 * LIBRARIES  # of MuJoCo, OpenGL and the encoder
+PIXEL_BYTES = 130.0  # of their buffers
+KEPT_PIXEL_BYTES = 1.5  # of each picture of a GIF
+FILE_BYTES = 0.1e6
+FILE_PIXEL_BYTES = 0.05  # of each picture
 
 
 def quiet_environment() -> dict[str, str]:

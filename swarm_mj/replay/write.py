@@ -31,7 +31,8 @@ RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
 RADIUS_SHARE = 1.4 * RING_SHARE  # of a body in 3-D, likewise
 OBSERVER = 1.3  # times larger
 BODY_HEIGHT = 0.8  # of a body, by its radius
-HALO, HALO_M = 1.7, 2.0  # of a robot that is cut off, by the robot's radius; its height [m]
+HALO = 1.7  # the radius around a robot that is cut off, by the robot's
+HALO_M = 2.0  # its height
 
 
 def write_replay(log: Log, config: Mapping[str, Any], path: Path) -> None:
@@ -112,7 +113,8 @@ def _draw_robots(out: RerunLog) -> None:
     out.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
     where = log.position_m.reshape(-1, 2)
     out.layer("arena/robots", positions=where, colors=log.colours.reshape(-1, 3))
-    row, where = np.arange(len(log.window)), log.position_m[:, log.ego]
+    row = np.arange(len(log.window))
+    where = log.position_m[:, log.ego]
     radius_m = 2.0 * RING_SHARE * out.ground.reach_m
     out.rings("arena/ego", where, radius_m, row)
     # The name is a point's label, for rerun misplaces an ellipse's.
@@ -190,9 +192,11 @@ def _draw_mismatch(out: RerunLog, radius_m: float, height_m: float) -> None:
         each = np.repeat(links, len(PIECES[kind]))
         out.mismatch_lines(f"arena/world/{kind}", each, divided(whole_m, PIECES[kind]))
     row, robot = np.nonzero(log.is_cut_off)
-    where_m, path = log.position_m[row, robot], "scene/world/cut_off"
+    where_m = log.position_m[row, robot]
     out.layer("arena/world/cut_off", row, positions=where_m)
+    path = "scene/world/cut_off"
     out.fixed(path, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
-    radii, lengths = np.full(len(row), HALO * radius_m), np.full(len(row), HALO_M)
+    radii = np.full(len(row), HALO * radius_m)
+    lengths = np.full(len(row), HALO_M)
     halos = rr.Cylinders3D.columns(centers=lifted(where_m, 0.0), radii=radii, lengths=lengths)
     out.things(path, halos, row)

@@ -22,7 +22,10 @@ NUM_SHADES = 48
 SHORTFALL = "missing to decode"  # the meaning of the numbers next to robots
 TAG = 2  # of dark ground around a number [pixels]
 LABELS_FIRST = 1000  # a number covers up to this many robots rather than another number
-ROOM, STEP = 3.7, 1.1  # for a legend's samples, and from one to the next [of the text's size]
+# In sizes of the text: texts that matter less or more, and a legend's samples, all of them and from
+# one to the next.
+SMALL, LARGE = 0.8, 1.3
+ROOM, STEP = 3.7, 1.1
 
 Font: TypeAlias = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
@@ -47,15 +50,14 @@ def draw_title(
 ) -> None:
     """Draw policy, mission, own parts and time above a scene, and its age in its curve's colour."""
     facts, now = footage.facts, footage.window[row]
-    mission, pad, small = facts.mission, size // 2, font(0.8 * size)
-    left, right, top = box.left + pad, box.right - pad, box.top + pad
-    draw.text((left, top), facts.policy, palette.TEXT, font(1.3 * size))
-    age = f"age {footage.age_mean[row]:.1f}"
-    draw.text((right, top), age, curve, font(1.3 * size), anchor="ra")
-    about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
-    where = ", ".join(where_flown(mission)).split(", ")
-    about = "\n".join([about, *filter(None, where), *facts.own_parts])
+    mission, small, large = facts.mission, font(SMALL * size), font(LARGE * size)
+    left, right, top = box.left + size // 2, box.right - size // 2, box.top + size // 2
+    draw.text((left, top), facts.policy, palette.TEXT, large)
+    draw.text((right, top), f"age {footage.age_mean[row]:.1f}", curve, large, anchor="ra")
     below = top + 1.7 * size
+    what = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
+    where = ", ".join(where_flown(mission)).split(", ")
+    about = "\n".join([what, *filter(None, where), *facts.own_parts])
     draw.text((left, below), about, palette.SENT, small)
     time = f"{now * mission.window_s:.1f} s, window {now}"
     draw.text((right, below), time, palette.SENT, small, anchor="ra")
@@ -66,8 +68,9 @@ def draw_title(
 
 def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: int) -> None:
     """Draw the ramp of ages, and the meaning of the packets' colours."""
-    small, observers = font(0.8 * size), _observers(footages)
-    full_scale, width = footages[0].facts.full_scale, box.right - box.left
+    small = font(SMALL * size)
+    observers = _observers(footages)
+    full_scale = footages[0].facts.full_scale
     text = f"colour: age of what {observers} (white) knows"
     draw.text((box.left, box.top), text, palette.TEXT, small)
     y, high = box.top + 1.25 * size, 0.55 * size
@@ -81,9 +84,11 @@ def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: in
     samples = _samples(footages, observers)
     # Two columns; the more samples there are, the closer they stand.
     step = min(STEP, ROOM / ((len(samples) + 1) // 2)) * size
-    small = font(min(0.8 * size, 0.9 * step))
+    small = font(min(SMALL * size, 0.9 * step))
     for k, (text, colour) in enumerate(samples.items()):
-        x, line = box.left + (k % 2) * width / 2, round(y + 1.3 * size) + step * (k // 2)
+        row, column = divmod(k, 2)
+        x = box.left + column * (box.right - box.left) / 2
+        line = round(y + 1.3 * size) + step * row
         if text == SHORTFALL:
             _draw_tag(draw, "dB", x, line, small)
         else:
@@ -188,14 +193,15 @@ class AgePlot:
 
     def draw_axes(self, draw: ImageDraw) -> None:
         """Draw what does not change: title, numbers, and the whole curves, faintly."""
-        small, inner, footages = font(0.8 * self._size), self._inner, self._footages
+        small, inner, footages = font(SMALL * self._size), self._inner, self._footages
         title = "mean age of information [windows]"
         draw.rectangle(inner, palette.GRID)
         # Two missions' columns could not be told apart.
         if len(footages) == 1 and np.any(footages[0].is_cut_off):
             title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
             # Columns: the share of the others that is cut off from the observer.
-            num_others, left = footages[0].facts.mission.num_robots - 1, float(inner.left)
+            num_others = footages[0].facts.mission.num_robots - 1
+            left = float(inner.left)
             share = (np.sum(footages[0].is_cut_off, axis=1) / num_others).tolist()
             for (right, _), part in zip(self._curves[0], share, strict=True):
                 if part > 0.0:

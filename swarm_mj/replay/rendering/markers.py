@@ -23,10 +23,12 @@ FOV_Y_DEG = 32.0  # a long lens: what is near is hardly larger than what is far
 SHIFT = 0.15  # of what it looks at, from the square's centre to the south, by half the side
 MARGIN = 0.94  # of the picture, for the square
 TAN = float(np.tan(np.deg2rad(FOV_Y_DEG / 2.0)))
-SIN, COS = np.sin(np.deg2rad(ELEVATION_DEG)), np.cos(np.deg2rad(ELEVATION_DEG))
+SIN = np.sin(np.deg2rad(ELEVATION_DEG))
+COS = np.cos(np.deg2rad(ELEVATION_DEG))
 
 # Sizes on the picture, of its height, whatever the size of the area.
-ROBOT, OBSERVER, HEADING, LINE = 0.0085, 0.0115, 0.022, 0.0025
+ROBOT, OBSERVER = 0.0085, 0.0115  # radii
+HEADING, LINE = 0.022, 0.0025  # a length and a width
 SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
 NO_TURN, NOWHERE = np.eye(3).ravel(), np.zeros(3)

@@ -15,7 +15,8 @@ from swarm_mj.system.processes import attempt
 
 CHOICE = "MUJOCO_GL"  # the variable by which people choose, and MuJoCo's renderer is told
 PYOPENGL = "PYOPENGL_PLATFORM"  # PyOpenGL's own, which MuJoCo and dm_control set
-OFF, ON = ("disable", "disabled", "off", "false", "0"), ("enable", "enabled", "on", "true", "1")
+OFF = ("disable", "disabled", "off", "false", "0")
+ON = ("enable", "enabled", "on", "true", "1")
 NAMES = ("egl", "osmesa", "glfw", "glx", "cgl", "wgl")  # each works on some systems
 WITHOUT_SCREEN = ("egl", "osmesa")  # on Linux; EGL may have a graphics card, OSMesa never
 TRIAL = "from mujoco.{} import GLContext; GLContext(8, 8).make_current()"

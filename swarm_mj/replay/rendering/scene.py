@@ -95,7 +95,7 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
         num, (width, height) = footage.position_m.shape[1], self._size
         if num != self._mission.num_robots:
             raise ValueError(f"footage must have {self._mission.num_robots} robots, not {num}")
-        data, camera, free = self._data, self.camera(footage, row), MjvCamera()
+        data = self._data
         data.qpos[:] = footage.position_m[row].ravel()
         mj_kinematics(self._model, data)
         mj_comPos(self._model, data)
@@ -104,11 +104,13 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
             # By whole tiles, so that the pattern stands still under a team that flies on.
             tiles = np.round(footage.ground.centre_m[row] / TILE_M)
             data.geom_xpos[self._floor, :2] = tiles * TILE_M
+        camera, free = self.camera(footage, row), MjvCamera()
         camera.aim(free)
         everything = mjtCatBit.mjCAT_ALL.value
         mjv_updateScene(self._model, data, self._options, None, free, everything, self._scene)
         draw_markers(self._scene, footage, row, camera)
-        picture, whole = np.empty((height, width, 3), np.uint8), MjrRect(0, 0, width, height)
+        picture = np.empty((height, width, 3), np.uint8)
+        whole = MjrRect(0, 0, width, height)
         self._opengl.make_current()  # there may be other renderers
         mjr_render(whole, self._scene, self._context)
         mjr_readPixels(picture, None, whole, self._context)

@@ -165,6 +165,8 @@ def encode_gif(pictures: Iterable[Picture], style: VideoStyle, samples: Sequence
         for picture in pictures
     )
     content = io.BytesIO()
-    first, lasts_ms = next(images), round(1000.0 / style.fps)
-    first.save(content, "gif", save_all=True, append_images=images, duration=lasts_ms, loop=0)
+    lasts_ms = round(1000.0 / style.fps)
+    next(images).save(
+        content, "gif", save_all=True, append_images=images, duration=lasts_ms, loop=0
+    )
     return content.getvalue()
