@@ -27,18 +27,6 @@ def ages(swarm):
     return swarm.now[0] - swarm.buffers.timestamp[0]
 
 
-def test_ages_are_those_of_the_buffers():
-    record, seen = flown(ages)
-    log, age = record.log(), np.array(seen)
-    np.testing.assert_array_equal(log.age, age)
-    np.testing.assert_array_equal(log.ego_age, age[:, 2])
-    np.testing.assert_allclose(log.age_mean, age.mean(axis=(1, 2)), rtol=1e-12)
-    is_known = ~np.isnan(log.known_age)
-    np.testing.assert_array_equal(log.known_age[is_known], log.ego_age[is_known])
-    assert set(log.ego_age[0, ~is_known[0]]) == {1.0}  # as old as the mission
-    assert log.known_age[0, 2] == 0.0
-
-
 def test_statistics_are_of_the_robots_that_are_on():
     def look(swarm):
         active, age = swarm.states.is_active, ages(swarm)
@@ -55,20 +43,28 @@ def test_statistics_are_of_the_robots_that_are_on():
 
 def test_a_log_is_the_swarm_s_state_field_by_field():
     def look(swarm):
-        states, buffers = swarm.states, swarm.buffers
+        states, buffers, age = swarm.states, swarm.buffers, ages(swarm)
+        is_known = buffers.timestamp[0, 3] > 0
         return {
             "position_m": states.position_m[0].copy(),
             "velocity_mps": states.velocity_mps[0].copy(),
             "velocity_variance_m2ps2": states.velocity_mps[0].var(axis=0).sum(),
             "believed_m": buffers.position_m[0, 3].copy(),
             "parent": buffers.parent[0, 3].copy(),
-            "is_other_known": (buffers.timestamp[0, 3] > 0) & (np.arange(6) != 3),
+            "age": age,
+            "age_mean": age.mean(),
+            "ego_age": age[3],  # of robots never heard of, the mission's
+            "known_age": [
+                own if known else np.nan for own, known in zip(age[3], is_known, strict=True)
+            ],
+            "is_other_known": is_known & (np.arange(6) != 3),
             "heard": [phase.heard[0].copy() for phase in swarm.phases],
         }
 
     record, seen = flown(look, task="flocking", ego=3, num_robots=6, num_windows=8)
     log = record.log()
     np.testing.assert_array_equal(log.window, np.arange(1, 9))
+    assert not np.all(seen[0]["is_other_known"])
     for field in seen[0]:
         expected = [row[field] for row in seen]
         np.testing.assert_allclose(getattr(log, field), expected, rtol=1e-9, err_msg=field)
