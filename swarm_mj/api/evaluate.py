@@ -21,7 +21,7 @@ from swarm_mj.system import needs
 from swarm_mj.system.fields import check_value, name_of
 from swarm_mj.system.needs import Needs, check_fits, memory_errors
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import AFTER_S, quiet_console
+from swarm_mj.system.terminal import quiet_console
 from swarm_mj.system.writing import Output, check_outputs
 
 if TYPE_CHECKING:  # each is slow to import
@@ -177,7 +177,7 @@ def evaluate(
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}
     with memory_errors():
-        fly_study(study, costs, num_jobs, None, quiet_console(), after_s=AFTER_S)
+        fly_study(study, costs, num_jobs, None, quiet_console())
     return Evaluation(mission=mission, results=summarise(study, costs, study.header()))
 
 

@@ -33,7 +33,7 @@ from swarm_mj.system.fields import check_kind, check_names
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import Needs, check_fits, free_memory, in_gb, memory_errors
 from swarm_mj.system.packages import commit, version
-from swarm_mj.system.terminal import WorkBar, quiet_bar, quiet_console
+from swarm_mj.system.terminal import WorkBar, quiet_console
 
 WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
 COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
@@ -104,7 +104,7 @@ def fly(
     recorder = Recorder(swarm, ego=observer) if record else None
     with quiet_console().status("Compiling, once for all flights ..."):
         compile_ahead(mission, name, **how)
-    bar = quiet_bar("Flying", mission.num_windows, "windows")
+    bar = WorkBar("Flying", mission.num_windows, "windows", console=quiet_console())
     flown = fly_swarm(swarm, recorder, bar, way_on="")
     if flown.code != DONE:
         kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"

@@ -21,7 +21,13 @@ from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system.fields import as_typed, did_you_mean
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import is_notebook, named_values, plain_console, quiet_bar
+from swarm_mj.system.terminal import (
+    WorkBar,
+    is_notebook,
+    named_values,
+    plain_console,
+    quiet_console,
+)
 from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv, write_json
 
 if TYPE_CHECKING:  # each is slow to import, and flights do without
@@ -231,7 +237,7 @@ class Run:
         from swarm_mj.replay.rendering.video import make_video
 
         style = fitted(replace(DEFAULTS[ending], seconds=default_seconds([footage])), ending)
-        with quiet_bar("Drawing", style.num_frames, "pictures") as bar:
+        with WorkBar("Drawing", style.num_frames, "pictures", console=quiet_console()) as bar:
             return make_video([footage], ending, style, bar.advance)
 
 

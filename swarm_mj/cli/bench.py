@@ -1,12 +1,18 @@
 """`swarm-mj bench`: how fast the simulation and its parts are on this machine."""
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli import bench_simulation as simulation
+from swarm_mj.cli.bench_simulation import (
+    Row,
+    evaluation_rows,
+    plain_step_us,
+    simulation_rows,
+    world_rows,
+)
 from swarm_mj.system.fields import setting
 from swarm_mj.system.terminal import plain_console, tell_cores
 
@@ -15,8 +21,8 @@ BUSY = 0.3  # the spread from which on numbers say little
 LEGEND = """\
 window: 100 ms of a mission. The indented rows below the line are its parts.
 plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
-obstacles: they cost most in MuJoCo, which looks for contacts in each of its ten steps a window.
-plan: what the planner's robots compute once in an epoch of half as many windows as robots.
+arena blocks: costs most in MuJoCo, which looks for contacts in each of its ten steps a window.
+planner: most of its time goes into plans, once in half as many windows as there are robots.
 team decision: the network decides for all robots of a team, in one window."""
 
 
@@ -41,16 +47,12 @@ def run(options: BenchOptions) -> int:
     """Run the command; return its exit code."""
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
-    tables, steps_us = [], []
+    tables, steps_us = [], [plain_step_us(options.seconds / 4)]
     with Console(stderr=True).status("Measuring ...") as status:
-        for title, head, columns in _measure(options, status.update):
-            rows = [row for column in columns for row in column]
-            steps_us += [row.value for row in rows if row.name == simulation.PLAIN_STEP]
-            tables.append(_table(title, head, columns))
-        steps_us.append(simulation.plain_step_us(options.seconds / 4))
-    console = Console(highlight=False)
-    for table in tables:
-        console.print(table)
+        for table in _tables(options, status.update):
+            tables.append(table)
+            steps_us.append(plain_step_us(options.seconds / 4))
+    Console(highlight=False).print(*tables, sep="\n")
     plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
     return 0
 
@@ -66,37 +68,38 @@ def noise(steps_us: Sequence[float]) -> str:
     )
 
 
-def _table(title: str, head: Sequence[str], columns: Sequence[Sequence[simulation.Row]]) -> Table:
-    """Return a table; its columns have rows of the same names."""
-    table = Table(title=title, title_justify="left", show_header=any(head))
-    for index, name in enumerate(head):
-        table.add_column(name, justify="right" if index else "left")
-    for rows in zip(*columns, strict=True):
-        values = (row.form.format(row.value) for row in rows)
-        table.add_row(rows[0].name, *values, end_section=rows[0].ends_section)
-    return table
-
-
-def _measure(
-    options: BenchOptions, say: Callable[[str], None]
-) -> Iterator[tuple[str, Sequence[str], list[list[simulation.Row]]]]:
-    """Yield each table's title, head and columns."""
-    seconds, episodes, columns = options.seconds, options.episodes, []
-    for num_missions in options.missions:
-        say(f"Measuring with {num_missions} side by side ...")
-        columns.append(list(simulation.simulation_rows(num_missions, options.threads, seconds)))
-    head = ("missions side by side", *map(str, options.missions))
-    yield "Simulation: 40 robots walk at random, policy round-robin", head, columns
+def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:
+    """Measure all that is asked for, and say what is under way."""
+    say("Measuring missions side by side ...")
+    columns = {
+        str(num_missions): list(simulation_rows(num_missions, options.threads, options.seconds))
+        for num_missions in options.missions
+    }
+    title = "Simulation: 40 robots walk at random, policy round-robin"
+    yield _table(title, columns, head="missions side by side")
     say("Measuring obstacles and fading ...")
     title = f"World: one window of one of {WORLD_MISSIONS} such missions"
-    yield title, ("", ""), [list(simulation.world_rows(WORLD_MISSIONS, seconds))]
-    if episodes:
-        say(f"Measuring an evaluation of {episodes} missions ...")
-        title = f"Evaluation: {episodes} random walks of 40 robots, 500 windows each"
-        yield (title, ("", ""), [list(simulation.evaluation_rows(episodes, options.jobs, seconds))])
+    yield _table(title, {"": list(world_rows(WORLD_MISSIONS, options.seconds))})
+    if options.episodes:
+        say(f"Measuring an evaluation of {options.episodes} missions ...")
+        title = f"Evaluation: {options.episodes} random walks of 40 robots, 500 windows each"
+        rows = evaluation_rows(options.episodes, options.jobs, options.seconds)
+        yield _table(title, {"": list(rows)})
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
         from swarm_mj.cli import bench_learning  # torch is slow to import
 
-        rows = bench_learning.learning_rows(threads=options.threads, seconds=seconds)
-        yield "Learning: 40 robots at rest", ("", ""), [list(rows)]
+        rows = bench_learning.learning_rows(threads=options.threads, seconds=options.seconds)
+        yield _table("Learning: 40 robots at rest", {"": list(rows)})
+
+
+def _table(title: str, columns: Mapping[str, Sequence[Row]], head: str = "") -> Table:
+    """Return a table of columns with rows of the same names; `head` stands above these names."""
+    table = Table(title=title, title_justify="left", show_header=bool(head))
+    table.add_column(head)
+    for name in columns:
+        table.add_column(name, justify="right")
+    for rows in zip(*columns.values(), strict=True):
+        first, *_ = rows
+        table.add_row(first.name, *(row.shown for row in rows), end_section=first.ends_section)
+    return table

@@ -6,15 +6,12 @@ The yardstick is a plain mj_step in the same run. A measurement takes about the 
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import product
 from timeit import repeat, timeit
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Int
-from mujoco._enums import mjtGeom
 from mujoco._functions import mj_step
-from mujoco._specs import MjSpec
 from mujoco._structs import MjData
 
 from swarm_mj.evaluation.batch import fly_batch
@@ -22,28 +19,22 @@ from swarm_mj.evaluation.flying import run_jobs
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper
-from swarm_mj.physics.arenas import BLOCK_M, HALF_HEIGHT_M, OBSTACLE_GROUP
-from swarm_mj.physics.scene import Scene, compose
+from swarm_mj.physics.scene import compose
 from swarm_mj.policies.centralised import RoundRobin
-from swarm_mj.policies.planner.plan import epoch_plan
-from swarm_mj.policies.planner.policy import epoch_windows
-from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.planner.snapshots import take_snapshots
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import channel_at, window
-from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
 ORACLE_EPISODES = 4  # at most: it takes its time
 REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
 MISSION = paper("random-walk")
-REGULAR_EPOCH = 3  # the planner's first that is not shorter than all others
-PLANS = {  # one robot's plan for an epoch
-    f"planner, {n} robots: one robot's plan": replace(MISSION, num_robots=n) for n in (40, 80, 200)
+PLANNED = {  # missions by what is said of them
+    "planner, 40 robots": MISSION,
+    "planner, 80 robots": replace(MISSION, num_robots=80),
+    "planner, 40 robots that hear 1 km far": replace(MISSION, range_ratio=1.0),
 }
-PLANS["planner, 40 robots that hear 1 km far"] = replace(MISSION, range_ratio=1.0)
-PLAIN_STEP = "one plain MuJoCo step of 40 robots"  # measured again and again
+PLAIN_STEP = "one plain MuJoCo step of 40 robots"
 IN_STEPS = "  that is so many plain MuJoCo steps"
 
 
@@ -54,6 +45,11 @@ class Row(NamedTuple):
     value: float
     form: str = "{:.2f} µs"  # of the value, with its unit
     ends_section: bool = False
+
+    @property
+    def shown(self) -> str:
+        """The value as the table has it."""
+        return self.form.format(self.value)
 
 
 def simulation_rows(num_missions: int, num_threads: int, seconds: float) -> Iterator[Row]:
@@ -67,13 +63,13 @@ def simulation_rows(num_missions: int, num_threads: int, seconds: float) -> Iter
     recipient = swarm.decide()
     swarm.step_with_recipients(recipient)
     request, response = swarm.phases
-    phases, channel = (request, response), channel_at(swarm.channel, swarm.now)
+    channel = channel_at(swarm.channel, swarm.now)
     parts = {
         "  the policy decides": swarm.decide,
         "  MuJoCo moves the robots": swarm.move,
         "  the radio delivers, buffers merge": talking(swarm, recipient),
         "  costs are measured": lambda: window_costs(
-            swarm.buffers, swarm.states, phases, swarm.now, is_broadcast=False
+            swarm.buffers, swarm.states, (request, response), swarm.now, is_broadcast=False
         ),
         "the radio alone": lambda: channel(swarm.states.position_m, recipient),
         "hops of news are counted (fly only)": lambda: mean_hops(swarm.buffers),
@@ -94,10 +90,9 @@ def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
     The two sides of a ratio are measured in turn, so that a machine's moods reach both.
     """
 
-    def window_us(scene: Scene | None = None, **world: Any) -> tuple[float, float]:
+    def window_us(**world: Any) -> tuple[float, float]:
         """Return a window, and of it what MuJoCo takes."""
-        swarm = Swarm(replace(MISSION, **world), range(num_missions), scene=scene)
-        policy = RoundRobin()
+        swarm, policy = Swarm(replace(MISSION, **world), range(num_missions)), RoundRobin()
         whole_us = microseconds(lambda: swarm.step(policy), seconds / 2)
         return whole_us / num_missions, microseconds(swarm.move, seconds / 4) / num_missions
 
@@ -106,25 +101,16 @@ def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
     yield Row("Rayleigh fading", faded_us)
     yield Row("  times free space", faded_us / exact_us, "{:.2f}", ends_section=True)
     plain_us, plain_move_us = window_us(physics="contact")
-    among_us, among_move_us = window_us(twenty_blocks, physics="contact")
+    among_us, among_move_us = window_us(arena="blocks", physics="contact")
     yield Row("free space, contact physics", plain_us)
     yield Row("  of these, MuJoCo moves the robots", plain_move_us)
-    yield Row("20 obstacles, contact physics", among_us)
+    yield Row("arena blocks, contact physics", among_us)
     yield Row("  of these, MuJoCo moves the robots", among_move_us)
     yield Row("  times none", among_us / plain_us, "{:.2f}")
 
 
-def twenty_blocks(spec: MjSpec, mission: Mission) -> None:
-    """Add five rows of four city blocks to a scene, as in arena `blocks`."""
-    half_m = [BLOCK_M / 2.0, BLOCK_M / 2.0, HALF_HEIGHT_M]
-    for x, y in product(np.linspace(-0.4, 0.4, 5), np.linspace(-0.375, 0.375, 4)):
-        place_m = [x * mission.side_m, y * mission.side_m, HALF_HEIGHT_M]
-        box = {"type": mjtGeom.mjGEOM_BOX, "group": OBSTACLE_GROUP}
-        spec.worldbody.add_geom(pos=place_m, size=half_m, **box)
-
-
 def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterator[Row]:
-    """Time an evaluation of the paper's baselines, the oracle, and a robot's plans of an epoch.
+    """Time an evaluation of the paper's baselines, the oracle, and the planner.
 
     The jobs share the baselines' missions, and starting them counts.
     """
@@ -139,12 +125,9 @@ def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterato
     num_oracles = min(num_episodes, ORACLE_EPISODES)
     oracle_s = _flying_s("greedy-oracle", num_episodes=num_oracles)
     yield Row("greedy-oracle, one mission", oracle_s / num_oracles, "{:.2f} s")
-    for name, mission in PLANS.items():
-        plan_ms = microseconds(_planning(mission), seconds / 4) / 1000.0
-        yield Row(name, plan_ms, "{:.1f} ms")
-        if mission.range_ratio == MISSION.range_ratio:
-            num_halves = 2 * _epoch_windows(mission)
-            yield Row("  for each of its slots of 50 ms", plan_ms / num_halves, "{:.2f} ms")
+    for name, mission in PLANNED.items():
+        window_us = _planned_window_us(mission, seconds / 4)
+        yield Row(f"{name}: one window of one mission", window_us)
     yield Row(PLAIN_STEP, step_us)
 
 
@@ -159,36 +142,20 @@ def _flying_s(
     return time.perf_counter() - start_s
 
 
-def _epoch_windows(mission: Mission) -> int:
-    return epoch_windows(REGULAR_EPOCH, mission.num_robots, PlannerSettings())
+def _planned_window_us(mission: Mission, seconds: float) -> float:
+    """Time a window of a mission that the planner flies [µs].
 
+    As many windows as robots are timed together: they are two of its epochs, of which each begins
+    with a plan.
+    """
+    swarm, planner = Swarm(mission, [0]), make_policy("planner", mission)
+    swarm.start(planner)
 
-def _planning(mission: Mission) -> Callable[[], object]:
-    """Return one robot's plan for an epoch, from what it knows after four rounds of TDMA."""
-    swarm, tdma = Swarm(mission, [0]), make_policy("tdma", mission)
-    for _ in range(2 * mission.num_robots):
-        swarm.step(tdma)
-    buffers, now, settings = swarm.buffers, float(swarm.now[0]), PlannerSettings()
-    num_windows = _epoch_windows(mission)
-    belief, seen = Belief(radio=radio_of(mission)), replace(settings, fresh_rounds=10.0)
+    def two_epochs() -> None:
+        for _ in range(mission.num_robots):
+            swarm.step(planner)
 
-    def plan() -> object:
-        """Plan the next epoch of one robot's snapshot."""
-        snapshots = take_snapshots(
-            buffers, 0, seen, now=now, window_s=mission.window_s, windows_ahead=num_windows / 2.0
-        )
-        planned = epoch_plan(
-            snapshots,
-            0,
-            belief,
-            settings,
-            timestamp=buffers.timestamp[0],
-            now=now,
-            is_free=np.ones(2 * num_windows, dtype=bool),
-        )
-        return planned.outcome()
-
-    return plan
+    return microseconds(two_epochs, seconds) / mission.num_robots
 
 
 def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], object]:

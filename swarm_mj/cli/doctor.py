@@ -54,7 +54,7 @@ class Finding(NamedTuple):
     group: str  # the heading it stands under
     name: str
     state: State
-    found: str
+    found: str = ""
     mend: str = ""  # what to do, if it is not ok
 
 
@@ -88,13 +88,13 @@ def packages() -> Iterator[Finding]:
     asked = [Requirement(text) for text in metadata.requires(PACKAGE) or ()]
     brought = [each for each in asked if each.marker is None or each.marker.evaluate({"extra": ""})]
     for each in brought:
-        is_core, mend = each.name in CORE, f"pip install '{each.name}{each.specifier}'"
-        if (found := _packages(each.name, [each], mend)).state != "ok" and is_core:
+        found = _packages(each.name, [each], f"pip install '{each.name}{each.specifier}'")
+        if found.state == "absent" and each.name in CORE:
             found = found._replace(state="broken", found=f"{found.found}; flying needs it")
         yield found
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
-        own = [each for each in asked if each.marker and each.marker.evaluate({"extra": extra})]
-        own = [each for each in own if each not in brought and each.name != PACKAGE]
+        added = [each for each in asked if each not in brought and each.name != PACKAGE]
+        own = [each for each in added if each.marker and each.marker.evaluate({"extra": extra})]
         yield _packages(f"extra {extra}", own, f"pip install '{PACKAGE}[{extra}]'")
 
 
@@ -115,13 +115,13 @@ def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
 
 def tried() -> Iterator[Finding]:
     """Fly, and render by each back end, to find what works."""
-    group, name, mend = "flying", "three robots fly", "see what `swarm-mj fly` says"
-    yield _of_trial(Finding(group, name, "broken", "", mend), FLIGHT)
+    mend = "see what `swarm-mj fly` says"
+    yield _of_trial(Finding("flying", "three robots fly", "broken", mend=mend), FLIGHT)
     for name, mend in RENDERING.items():
-        group, variable = "rendering without a display", f"MUJOCO_GL={name}"
+        group = "rendering without a display"
+        failed = Finding(group, f"MUJOCO_GL={name}", "absent", mend=mend)
         # What else is set for PyOpenGL would bind all of them to one back end.
-        variables = {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name}
-        yield _of_trial(Finding(group, variable, "absent", "", mend), RENDER, variables)
+        yield _of_trial(failed, RENDER, {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name})
 
 
 def _of_trial(failed: Finding, program: str, variables: Mapping[str, str] | None = None) -> Finding:

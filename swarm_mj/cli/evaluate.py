@@ -79,8 +79,8 @@ def run(options: EvaluateOptions) -> int:
     inputs = stored_policies(options.policy)
     check_outputs(*outputs, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
-    needs, output = study_needs(study, options.jobs), options.json or options.csv
-    check_fits(needs, output, way_out, is_forced=options.yes)
+    needs = study_needs(study, options.jobs)
+    check_fits(needs, options.json or options.csv, way_out, is_forced=options.yes)
     with ExitStack() as stack:
         for path in filter(None, (options.json, options.csv)):
             stack.enter_context(owned(path))
@@ -90,7 +90,8 @@ def run(options: EvaluateOptions) -> int:
 def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     """Fly the rest of a study, and write its results; `kept` is the progress file."""
     tell_cores(options.jobs)
-    console, header = Console(stderr=True, highlight=False), study.header()
+    console = Console(stderr=True, highlight=False)
+    header = study.header()
     costs: dict[int, BatchCosts] = {}
     if kept and options.resume and kept.exists():
         costs = flying.resume_progress(kept, header)

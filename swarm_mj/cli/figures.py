@@ -17,6 +17,9 @@ from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
+DRAWING = 2.0 * LIBRARIES  # matplotlib's memory besides [bytes]
+OBJECTS = 10.0  # bytes of memory for a byte of results
+PICTURE = 1e6  # the largest file [bytes]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,9 +81,9 @@ def run(options: FiguresOptions) -> int:
 
 
 def figures_needs(results: tuple[Path, ...], num_files: int) -> Needs:
-    """Return what drawing takes: the results as objects, and pictures of 1 MB at most."""
+    """Return what drawing takes: the results as objects, and files of pictures."""
     read = sum(path.stat().st_size for path in results if path.is_file())
-    return Needs(memory=2.0 * LIBRARIES + 10.0 * read, file=1e6 * num_files)
+    return Needs(memory=DRAWING + OBJECTS * read, file=PICTURE * num_files)
 
 
 def _papers(path: Path) -> list[Result]:

@@ -72,20 +72,26 @@ def run(options: FlyOptions) -> int:
     policy = registry.make_policy(name, mission, **options.how)
     components = options.components.made(mission)
     registry.check_used(options.features, [policy])
-    console, ego = Console(stderr=True, highlight=False), options.observer
+    console = Console(stderr=True, highlight=False)
     with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
         compile_ahead(mission, name, **options.how)
         swarm = Swarm(mission, [options.seed], **components.given)
         swarm.start(policy)
-        recorder = Recorder(swarm, ego=ego) if path else None
+        recorder = Recorder(swarm, ego=options.observer) if path else None
     for note in notes_on(mission):
         console.print(note)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
     way_on = None if options.yes else "; --yes flies on all the same"
     flown = fly_swarm(swarm, recorder, bar, way_on=way_on)
-    given = {"seed": options.seed, "observer": ego, "components": options.components}
     with deferred_interrupt(), ExitStack() as stack:
-        run = run_of(swarm, flown, name=name, **given)
+        run = run_of(
+            swarm,
+            flown,
+            name=name,
+            seed=options.seed,
+            observer=options.observer,
+            components=options.components,
+        )
         # The stack unwinds in reverse: the replay is written even if the summary fails, and the
         # table is printed in any case.
         stack.callback(lambda: plain_console().print(run.table()))
@@ -97,9 +103,9 @@ def run(options: FlyOptions) -> int:
     for label, line in _next_commands(options, path):
         plain_console().print(f"{label:18}{line}")
     if flown.code != DONE:
-        number = mission.num_windows
-        windows = f"{len(flown.windows)} of {number} window{'s' * (number != 1)}"
-        console.print(f"{flown.ending} after {windows}.")
+        console.print(
+            f"{flown.ending} after {len(flown.windows)} of {mission.num_windows} windows."
+        )
         return flown.code
     return run_viewer(view_command(path)) if options.view and path else DONE
 

@@ -1,6 +1,6 @@
 """Options that several commands share: those that make missions, and those of policies."""
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from functools import partial
 from itertools import product
@@ -16,7 +16,8 @@ from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
-_policy, TUNED = partial(setting, group="policies"), "tuned for the regime"
+_policy = partial(setting, group="policies")
+TUNED = "tuned for the regime"
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 
 
@@ -66,9 +67,15 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
 
     The last field's values vary fastest; raises ValueError if one is unknown or out of range.
     """
-    swept = {spec.name: given[p] for spec in SPECS if (p := f"mission.{spec.name}") in given}
-    values = [dict.fromkeys(v) if isinstance(v, tuple) else [v] for v in swept.values()]
-    missions = [make_mission(**dict(zip(swept, each, strict=True))) for each in product(*values)]
+    swept: dict[str, Iterable[Any]] = {}
+    for spec in SPECS:
+        place = f"mission.{spec.name}"
+        if place in given:
+            value = given[place]
+            swept[spec.name] = dict.fromkeys(value) if isinstance(value, tuple) else [value]
+    missions = [
+        make_mission(**dict(zip(swept, values, strict=True))) for values in product(*swept.values())
+    ]
     check_in_use(swept, missions)
     return tuple(missions)
 

@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 
 VIDEO = "video"  # a heading of the help
 _video = partial(setting, group=VIDEO)
-OWN_TIME, BARE = f"the mission's own time, {view.LONGEST_S:g} at most", "the bare arena"
+OWN_TIME = f"the mission's own time, {view.LONGEST_S:g} at most"
+BARE = "the bare arena"
 SUFFIXES = ".mp4|.gif"
 PIXELS = (160, 3840)  # of a side
 

@@ -65,7 +65,7 @@ def run(options: TrainOptions) -> int:
         ending = "Out of memory" if is_memory else "Broken off"
         console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return FAILED if is_memory else INTERRUPTED
-    if watch.start is None:
+    if not watch.has_begun:
         console.print(
             "Nothing was left to train: raise --budget or --minutes, which count in all, or give "
             "--patience 0 if the run stopped early."

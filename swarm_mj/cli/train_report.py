@@ -2,13 +2,12 @@
 
 import math
 from collections.abc import Callable, Iterator
-from dataclasses import replace
 
 from rich.console import Console
 
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
-from swarm_mj.learning.selection import ORACLE, REFERENCES, Cost, Progress, Row, Status
+from swarm_mj.learning.selection import ORACLE, REFERENCES, Choice, Cost, Progress, Row, Status
 from swarm_mj.system.terminal import WorkBar
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
@@ -25,21 +24,18 @@ class Watch(WorkBar):
         """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", 1.0, console=console)
         self._console, self._run, self._is_interrupted = console, run, is_interrupted
-        self.start: Progress | None = None  # of this session, once there was anything to do
-        self._num_rows = 0
+        self._num_rows = 0  # of the curve that were shown, in this session or before
+        self.has_begun = False  # whether there was anything to do
         self.has_stopped = False  # whether the run was asked to stop
 
     def __call__(self, status: Status) -> bool:
         """Show a status; return whether to go on."""
-        progress, limits = status.progress, self._run.limits
-        if self.start is None:
-            self.start, self._num_rows = replace(progress), len(progress.curve)
-        if len(progress.curve) > self._num_rows:
-            self._num_rows = len(progress.curve)
+        progress = status.progress
+        if self.has_begun and len(progress.curve) > self._num_rows:
             self._console.print(_row(self._run, progress))
-        self.what = status.what
-        self.text = _text(status, self.start)
-        self.move_to(share_done(progress, limits))
+        self.has_begun, self._num_rows = True, len(progress.curve)
+        self.what, self.text = status.what, _text(status)
+        self.move_to(share_done(progress, self._run.limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
             self._console.print(f"Interrupted: {FINISHING}.")
@@ -60,29 +56,39 @@ def share_done(progress: Progress, limits: Limits) -> float:
 
 def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     """Return rows for the closing table: the policy kept, and others on the same missions."""
-    training, best, choice = run.training, progress.best, progress.choice
-    if best is None:
+    if progress.best is None:
         return {}
-    first, cost = progress.curve[0], training.reward
-    if choice is None:  # of the best evaluation, the age is shown whatever the cost
-        cost, missions = "aoi", f"{training.held_out} of each team size, which chose the policy"
-        when = "untrained" if best is first else f"after {best['decisions']:,.0f} decisions"
-        kept, others = _age(best), {"first": _age(first)} | _reference_ages(best)
-    else:
-        missions = f"{choice.num_missions} of each team size, which chose nothing"
-        when = f"after {choice.decisions:,} decisions"
-        kept, others = choice.kept, choice.others
-    rows = {"missions": missions, "policy kept": f"{_amount(kept, cost)}, {when}"}
-    for name, each in others.items():
+    training, is_chosen = run.training, progress.choice is not None
+    choice = progress.choice or _best_so_far(run, progress, progress.best)
+    cost = training.reward if is_chosen else "aoi"  # evaluations tell the error of the age alone
+    chosen = "nothing" if is_chosen else "the policy"
+    rows = {
+        "missions": f"{choice.num_missions} of each team size, which chose {chosen}",
+        "policy kept": f"{_amount(choice.kept, cost)}, after {choice.decisions:,} decisions",
+    }
+    for name, each in choice.others.items():
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
         rows[NAMES.get(name, name)] = _amount(each, cost) + known
     # The oracle flies few missions, those of evaluations only.
-    if (age := _reference_ages(first).get(ORACLE)) is not None:
+    if (age := _reference_ages(progress.curve[0]).get(ORACLE)) is not None:
         missions = f"on {_oracle_missions(run)} of the evaluations"
         rows[ORACLE] = f"{_amount(age, 'aoi')}, {missions}; {REFERENCES[ORACLE]}"
-    elif max(training.robots) > (most := selection.ORACLE_ROBOTS):
-        rows[ORACLE] = f"not flown: it would take long with more than {most} robots"
+    elif max(training.robots) > selection.ORACLE_ROBOTS:
+        too_many = f"more than {selection.ORACLE_ROBOTS} robots"
+        rows[ORACLE] = f"not flown: it would take long with {too_many}"
     return rows
+
+
+def _best_so_far(run: TrainingRun, progress: Progress, best: Row) -> Choice:
+    """Return the choice that a run which has made none would make now: its best evaluation."""
+    return Choice(
+        decisions=int(best["decisions"]),
+        run_decisions=progress.decisions,
+        num_finalists=1,
+        num_missions=run.training.held_out,
+        kept=_age(best),
+        others={"first": _age(progress.curve[0])} | _reference_ages(best),
+    )
 
 
 def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
@@ -104,10 +110,15 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
     for name, cost in choice.others.items():
         if cost.behind > 0.0:
             difference = Cost(mean=cost.behind, sem=cost.behind_sem)
-            other, behind = NAMES.get(name, name), _amount(difference, run.training.reward)
+            behind = _amount(difference, run.training.reward)
+            other = NAMES.get(name, name)
             is_clear = cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem
-            lost, level = f"loses to {other} by", f"is no better than {other}, which is ahead by"
-            yield f"The policy kept {lost if is_clear else level} {behind} on the same missions."
+            place = (
+                f"loses to {other} by {behind}"
+                if is_clear
+                else f"is no better than {other}, which is ahead by {behind}"
+            )
+            yield f"The policy kept {place} on the same missions."
 
 
 def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
@@ -128,7 +139,7 @@ def _row(run: TrainingRun, progress: Progress) -> str:
     return f"{when}   held-out age {age}{note:13}{others}"
 
 
-def _text(status: Status, start: Progress) -> str:
+def _text(status: Status) -> str:
     progress = status.progress
     parts = [f"{progress.decisions:,} decisions"]
     if status.evaluated is not None:
@@ -137,9 +148,6 @@ def _text(status: Status, start: Progress) -> str:
         parts.append(f"age {status.aoi:.1f}")
     if progress.curve:
         parts.append(f"held out {progress.curve[-1]['aoi']:.1f}")
-    made, minutes = progress.decisions - start.decisions, progress.minutes - start.minutes
-    if made and minutes:
-        parts.append(f"{made / minutes / 60.0:.0f}/s")
     return ", ".join(parts)
 
 

@@ -45,7 +45,10 @@ def setting_options() -> Iterator[Field[Any]]:
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
     """Return the settings that were given, by their places; a value of several counts once."""
     values = {place: given[place] for place in SPECS if place in given}
-    return {p: tuple(dict.fromkeys(x)) if isinstance(x, tuple) else x for p, x in values.items()}
+    for place, value in values.items():
+        if isinstance(value, tuple):
+            values[place] = tuple(dict.fromkeys(value))
+    return values
 
 
 def asked_settings(
@@ -58,7 +61,9 @@ def asked_settings(
     Raises:
         ValueError: A value is unknown or outside its range, or contradicts another.
     """
-    own, network, asked = (_part(name, given) for name in ("", "network", "mission"))
+    own = _part("", given)
+    network = _part("network", given)
+    asked = _part("mission", given)
     sizes = own.get("robots", (Mission().num_robots,))
     mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
     check_in_use(asked, [mission])
@@ -66,7 +71,8 @@ def asked_settings(
     if init is not None:
         same = {name: getattr(init, name) for name in ("network", "features", "silence_logit")}
         training = replace(training, **same)
-        shape = {p: x for p, x in given.items() if p.startswith(("features", "network"))}
+        places = [place for place in given if place.startswith(("features", "network"))]
+        shape = {place: given[place] for place in places}
         refuse_others(shape, training, f"the policy {init_path}")
         check_named(init.features, own_names(given), f"policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
@@ -75,11 +81,9 @@ def asked_settings(
     load_own(own.get("features", training.features), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
-    # As near to the usual number of groups as an equal share of each team size allows.
-    able = [n for n in range(len(sizes), missions + 1, len(sizes)) if missions % n == 0]
     training = replace(
         training,
-        groups=min(able, key=lambda n: (abs(n - Training.groups), -n), default=1),
+        groups=_num_groups(missions, len(sizes)),
         network=replace(training.network, **network),
         ppo=replace(training.ppo, **_part("ppo", given)),
         **own,
@@ -117,8 +121,13 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
 
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
-    places = {place: place.rpartition(".") for place in given}
-    return {name: given[place] for place, (owner, _, name) in places.items() if owner == part}
+    """Return the settings given of one part, by their names in it."""
+    found = {}
+    for place, value in given.items():
+        owner, _, name = place.rpartition(".")
+        if owner == part:
+            found[name] = value
+    return found
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
@@ -128,9 +137,15 @@ def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
     if asked % num_sizes:
         fewer = asked // num_sizes * num_sizes
         ways = ", ".join(str(n) for n in (fewer, fewer + num_sizes) if n > 0)
-        needed = f"missions must be a multiple of the {num_sizes} team sizes, such as {ways}"
-        raise ValueError(f"{needed}, not {asked}")
+        rule = f"missions must be a multiple of the {num_sizes} team sizes, such as {ways}"
+        raise ValueError(f"{rule}, not {asked}")
     return asked
+
+
+def _num_groups(missions: int, num_sizes: int) -> int:
+    """Return a number near to the usual one of groups, each with as many of every team size."""
+    able = [n for n in range(num_sizes, missions + 1, num_sizes) if missions % n == 0]
+    return min(able, key=lambda n: (abs(n - Training.groups), -n), default=1)
 
 
 def _usual(place: str) -> str:

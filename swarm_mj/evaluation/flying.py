@@ -52,12 +52,10 @@ def fly_study(
     num_jobs: int,
     keep: Callable[[int, BatchCosts], None] | None,
     console: Console,
-    *,
-    after_s: float = 0.0,
 ) -> None:
     """Fly the batches that `costs` lacks, into `costs` and where they are kept.
 
-    A bar on the console shows the progress once the flights have taken `after_s` seconds.
+    A bar on the console shows the progress.
 
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
@@ -70,7 +68,6 @@ def fly_study(
         "missions",
         completed=num_flown(study, costs),
         console=console,
-        after_s=after_s,
     )
     with bar, closing(flown):
         for which, batch_costs in flown:

@@ -26,9 +26,16 @@ GROUPS = {
 FILES = ("inactive_file", "active_file", "slab_reclaimable")  # memory that a group can give back
 
 GB = 1e9
-LIBRARIES, TORCH = 0.15 * GB, 0.4 * GB  # compiling included; torch with the code that trains
-# Address space that is reserved and never filled: by Python's libraries, by torch, by rerun.
-ADDRESSES, OF_TORCH, OF_RERUN = 0.5 * GB, 0.7 * GB, 3.0 * GB
+LIBRARIES = 0.15 * GB  # compiling included
+TORCH = 0.4 * GB  # with the code that trains
+# Of a mission and each pair of its robots [bytes].
+PAIR = 100.0  # the tables of robots, costs and the radio
+LEARNED_PAIR = 450.0  # these, and the network's input
+HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
+# Address space that is reserved and never filled.
+ADDRESSES = 0.5 * GB  # by Python's libraries
+OF_TORCH = 0.7 * GB
+OF_RERUN = 3.0 * GB
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,9 +77,8 @@ def missions_memory(num_robots: int, num_missions: int, *, is_learned: bool) -> 
     """Return the memory of missions side by side: the robots' tables, and a network's input."""
     pairs = num_missions * num_robots**2
     if not is_learned:
-        return LIBRARIES + 100.0 * pairs
-    # A learned policy remembers packets: N entries of each pair.
-    return LIBRARIES + TORCH + 450.0 * pairs + 4.0 * pairs * num_robots
+        return LIBRARIES + PAIR * pairs
+    return LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * num_robots) * pairs
 
 
 def in_gb(size: int | float) -> str:

@@ -4,7 +4,6 @@ import os
 import shutil
 import sys
 from pathlib import Path
-from threading import Timer
 from typing import Any
 
 from rich.console import Console
@@ -12,7 +11,6 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 BAR_WIDTH = 20
-AFTER_S = 2.0  # shorter work from Python shows no bar
 SPEED_OVER_S = 600.0  # several rollouts of a training, and evaluations between them
 
 
@@ -80,12 +78,10 @@ class WorkBar:
         *,
         completed: float | int = 0,
         console: Console | None = None,
-        after_s: float = 0.0,
     ) -> None:
         """Prepare the bar, on standard error unless there is another console.
 
-        Without a unit, it shows no numbers; the time left is by the speed of late. Work that is
-        done in less than `after_s` shows no bar [s].
+        Without a unit, it shows no numbers; the time left is by the speed of late.
         """
         self.what, self.text = what, ""
         console = console or Console(stderr=True, highlight=False)
@@ -101,21 +97,13 @@ class WorkBar:
             transient=True,
             disable=not console.is_terminal,
         )
-        self._timer = Timer(after_s, self._bar.start)
-        self._timer.daemon = True
         self._id = self._bar.add_task("", total=total, completed=int(completed), bar=self)
 
     def __enter__(self) -> "WorkBar":
-        if self._timer.interval > 0.0 and not self._bar.disable:
-            self._timer.start()
-        else:
-            self._bar.start()
+        self._bar.start()
         return self
 
     def __exit__(self, *error: object) -> None:
-        self._timer.cancel()
-        if self._timer.is_alive():
-            self._timer.join()
         self._bar.stop()
 
     def advance(self, done: int = 1) -> None:
@@ -130,8 +118,3 @@ class WorkBar:
     def shown_what(self) -> str:
         """The words before the bar, which are asked for at every redrawing."""
         return self.what
-
-
-def quiet_bar(what: str, total: int, unit: str) -> WorkBar:
-    """Return a bar for Python: on a terminal, once the work takes its time."""
-    return WorkBar(what, total, unit, console=quiet_console(), after_s=AFTER_S)

@@ -9,12 +9,9 @@ from swarm_mj.cli.bench_simulation import (
     evaluation_rows,
     simulation_rows,
     talking,
-    twenty_blocks,
     world_rows,
 )
 from swarm_mj.mission import paper
-from swarm_mj.physics.arenas import obstacles_of
-from swarm_mj.physics.scene import compose
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.simulation.swarm import Swarm
@@ -34,15 +31,8 @@ def test_worlds_are_timed_against_free_space_in_the_same_physics():
     assert all(value > 0 for value in rows.values())
     fading = rows["Rayleigh fading"] / rows["free space"]
     assert rows["  times free space"] == pytest.approx(fading)
-    obstacles = rows["20 obstacles, contact physics"] / rows["free space, contact physics"]
+    obstacles = rows["arena blocks, contact physics"] / rows["free space, contact physics"]
     assert rows["  times none"] == pytest.approx(obstacles)
-
-
-def test_twenty_blocks_are_obstacles():
-    mission = paper("random-walk", physics="contact")
-    found = obstacles_of(compose(mission, scene=twenty_blocks).compile())
-    assert len(found.kind) == 20
-    assert np.all(np.abs(found.centre_m[:, :2]) + 55.0 <= mission.half_side_m)
 
 
 @pytest.mark.slow

@@ -187,7 +187,7 @@ def test_the_bar_says_where_the_run_stands_and_what_is_evaluated():
     ]
     shown, _, _ = heard_by(lambda: False, statuses[:2], terminal=True)
     assert "Training" in shown
-    assert "2,000 decisions, age 28.0, held out 31.5, 17/s 0:02:00" in shown
+    assert "2,000 decisions, age 28.0, held out 31.5 0:02:00" in shown
     shown, _, _ = heard_by(lambda: False, statuses, terminal=True)
     assert "Choosing" in shown
     assert "missions 40%" in shown

@@ -2,14 +2,13 @@
 
 import io
 import sys
-import time
 from types import SimpleNamespace
 
 import pytest
 from rich.console import Console
 
 from swarm_mj.system import terminal
-from swarm_mj.system.terminal import WorkBar, named_values, plain_console, this_command
+from swarm_mj.system.terminal import WorkBar, plain_console, this_command
 
 
 @pytest.mark.parametrize("is_error", [False, True])
@@ -29,16 +28,6 @@ def test_more_threads_than_cores_are_told(capsys, monkeypatch):
     assert capsys.readouterr().err == ""
     terminal.tell_cores(3, "threads")
     assert capsys.readouterr().err.startswith("3 threads share 2 cores: those above 2")
-
-
-def test_values_stand_beside_their_names_under_the_title():
-    shown = io.StringIO()
-    table = named_values("A flight", {"age": "13.4", "hops": "1.2"}, caption="of all pairs")
-    Console(file=shown, width=40).print(table)
-    lines = [line.strip() for line in shown.getvalue().splitlines()]
-    rows = [line.strip("│ ").split() for line in lines if "│" in line]
-    assert (lines[0], lines[-1]) == ("A flight", "of all pairs")
-    assert rows == [["age", "│", "13.4"], ["hops", "│", "1.2"]]
 
 
 @pytest.mark.parametrize(
@@ -63,11 +52,11 @@ def test_a_program_is_called_by_name_if_that_is_the_one(
     assert this_command(name) == called
 
 
-def bar_on(is_terminal=True, **options):
+def bar_on(is_terminal=True):
     """A bar, and what it draws."""
     file = io.StringIO()
     console = Console(file=file, force_terminal=is_terminal, width=100, color_system=None)
-    return WorkBar("Flying", 40, "missions", completed=10, console=console, **options), file
+    return WorkBar("Flying", 40, "missions", completed=10, console=console), file
 
 
 def test_the_bar_says_what_is_under_way_and_how_far_it_is():
@@ -93,23 +82,11 @@ def test_the_bar_is_gone_in_the_end_also_after_a_failure():
     assert file.getvalue().endswith(("\x1b[2K", "\x1b[2K\r", "\x1b[?25h\r\x1b[1A\x1b[2K"))
 
 
-@pytest.mark.parametrize("after_s", [0.0, 0.01])
-def test_nothing_is_drawn_where_nobody_looks(after_s):
-    bar, file = bar_on(is_terminal=False, after_s=after_s)
+def test_nothing_is_drawn_where_nobody_looks():
+    bar, file = bar_on(is_terminal=False)
     with pytest.raises(KeyboardInterrupt), bar:
         raise KeyboardInterrupt
     assert file.getvalue() == ""
-
-
-@pytest.mark.parametrize(("after_s", "is_shown"), [(0.01, True), (100.0, False)])
-def test_a_bar_waits_for_work_that_takes_its_time(after_s, is_shown):
-    bar, file = bar_on(after_s=after_s)
-    with bar:
-        for _ in range(1000):
-            if "Flying" in file.getvalue() or not is_shown:
-                break
-            time.sleep(0.01)
-    assert ("Flying" in file.getvalue()) == is_shown
 
 
 def test_notebooks_which_claim_to_be_terminals_show_none(monkeypatch):

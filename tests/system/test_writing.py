@@ -127,18 +127,6 @@ def test_what_the_dead_had_not_finished_is_removed_and_what_others_write_is_not(
     assert set(names(tmp_path)) == {"x", *left}
 
 
-def test_a_link_in_the_part_s_place_is_not_written_through(tmp_path, monkeypatch):
-    monkeypatch.setattr("secrets.token_hex", lambda _: "01234567")
-    (tmp_path / "precious").write_text("x")
-    monkeypatch.setattr(
-        writing, "_sweep", lambda _: (tmp_path / ".x.01234567.part").symlink_to("precious")
-    )
-    with pytest.raises(OSError, match="x could not be written: File exists"):
-        write_bytes(tmp_path / "x", b"new")
-    assert names(tmp_path) == ["precious"]
-    assert (tmp_path / "precious").read_text() == "x"
-
-
 @pytest.fixture
 def places(here):
     """Files, folders and links that may be in the way."""
