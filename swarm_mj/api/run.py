@@ -15,7 +15,7 @@ from rich.table import Table
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
-from swarm_mj.protocol.costs import PACKETS
+from swarm_mj.protocol.costs import PACKET_COUNTS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
@@ -47,7 +47,7 @@ PLACES = {  # of a window's numbers in its record, by their columns
     "task_cost": "costs.task_cost.value",
     "hops": "hops",
     "is_complete": "costs.is_complete",
-    **{f"packets_{name}": f"costs.packets.{name}" for name in PACKETS},
+    **{f"packets_{name}": f"costs.packets.{name}" for name in PACKET_COUNTS},
 }
 ENDINGS = ".rrd|.mp4|.gif|.json|.csv"  # of files that hold a run
 
