@@ -2,7 +2,10 @@
 PYTHON ?= python3
 BIN := .venv/bin
 READY := .venv/ready
+DEV := .venv/dev
+HASHES := tools/hashes.txt tools/hashes-dev.txt
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
+UV := $(BIN)/uv pip install --python $(BIN)/python --quiet
 ARGS ?=
 SCALE ?= quick
 
@@ -21,23 +24,34 @@ help:
 	@echo "make video   remake the moving picture (needs OpenGL, or libosmesa6)"
 	@echo "make picture remake the pictures of replays (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
-	@echo "make setup   create .venv from pinned constraints; PYTHON=python3.12 chooses another"
-	@echo "make lock    write tools/hashes.txt anew from the pinned constraints"
+	@echo "make setup   create .venv from pinned wheels; PYTHON=python3.12 chooses another"
+	@echo "make lock    write tools/hashes*.txt anew from the pinned constraints"
 	@echo "make audit   list the licences of what is installed, and its known vulnerabilities"
 	@echo "make clean   remove .venv, replays and caches"
 
 setup: $(READY)
 
 # Every wheel must have the hash it was tested with, but torch's, which differ from index to index: a
-# CPU build on one, CUDA's gigabytes on another.
-$(READY): pyproject.toml tools/constraints.txt tools/hashes.txt
+# CPU build on one, CUDA's gigabytes on another. uv installs in seconds what takes pip minutes; but
+# pip alone knows an index that only pip's configuration names, so it is the way out, and brings torch.
+hashed = $(UV) --no-deps --require-hashes --requirement $(1) || { echo "uv cannot; pip goes on ..."; \
+  $(PIP) --no-deps --require-hashes --requirement $(1); }
+
+$(READY): pyproject.toml tools/constraints.txt tools/hashes-uv.txt tools/hashes.txt
 	@$(PYTHON) -c "import sys; sys.exit(0 if (3, 11) <= sys.version_info < (3, 13) else \
 	  f'the pinned versions are for Python 3.11 and 3.12, not {sys.version.split()[0]}; ' \
 	  'try make PYTHON=python3.11')"
-	@echo "Setting up .venv (a few minutes, once; 3.3 GB, or 6.9 GB with CUDA) ..."
+	@echo "Setting up .venv (a minute, once; 2.4 GB, or 6 GB with CUDA) ..."
 	@$(PYTHON) -m venv .venv
-	@$(PIP) --no-deps --require-hashes --requirement tools/hashes.txt
-	@$(PIP) --constraint tools/constraints.txt --no-build-isolation --editable '.[dev]'
+	@$(PIP) --no-deps --require-hashes --requirement tools/hashes-uv.txt
+	@$(call hashed,tools/hashes.txt)
+	@$(PIP) --constraint tools/constraints.txt torch
+	@$(PIP) --no-deps --no-build-isolation --editable .
+	@touch $@
+
+# What the tests, the checks and the documentation need on top.
+$(DEV): $(READY) tools/hashes-dev.txt
+	@$(call hashed,tools/hashes-dev.txt)
 	@touch $@
 
 fly: setup
@@ -46,7 +60,7 @@ fly: setup
 bench: setup
 	$(BIN)/swarm-mj bench $(ARGS)
 
-check: setup
+check: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/basedpyright
@@ -54,13 +68,13 @@ check: setup
 # Tests of a module run in one process, which has its fixtures; both share numba's cache on disk.
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder
 
-test: setup
+test: $(DEV)
 	$(PYTEST) -m "not slow" $(ARGS)
 
-test-all: setup
+test-all: $(DEV)
 	$(PYTEST) $(ARGS)
 
-attack: setup
+attack: $(DEV)
 	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)
 
 # What torch alone needs comes with it.
@@ -69,24 +83,28 @@ OF_TORCH := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cubla
   nvidia-cusolver nvidia-cusparse nvidia-cusparselt-cu13 nvidia-nccl-cu13 nvidia-nvjitlink \
   nvidia-nvshmem-cu13 nvidia-nvtx
 
-lock: .venv/audit/ready
-	.venv/audit/bin/uv pip compile pyproject.toml --extra dev --constraint tools/constraints.txt \
-	  --universal --python-version 3.11 --generate-hashes --no-annotate --no-header --quiet \
-	  $(OF_TORCH:%=--no-emit-package %) --output-file tools/hashes.txt
+COMPILE := $(BIN)/uv pip compile --constraint tools/constraints.txt --universal --python-version 3.11 \
+  --generate-hashes --no-annotate --no-header --quiet $(OF_TORCH:%=--no-emit-package %)
 
-audit: setup .venv/audit/ready
+lock: setup
+	echo uv | $(COMPILE) - --output-file tools/hashes-uv.txt
+	printf 'hatchling\neditables\n' | $(COMPILE) pyproject.toml - --output-file tools/hashes.txt
+	$(COMPILE) pyproject.toml --extra dev --output-file tools/hashes-dev.txt \
+	  $$(sed -n 's/^\(.*\)==[^ ]* \\$$/--no-emit-package \1/p' tools/hashes.txt)
+
+audit: $(DEV) .venv/audit/ready
 	.venv/audit/bin/pip-licenses --python $(BIN)/python --order license
-	@.venv/audit/bin/pip-audit --require-hashes --disable-pip --strict --requirement tools/hashes.txt \
-	  || { echo "No complete audit: either this package index keeps no list of vulnerabilities," \
+	@.venv/audit/bin/pip-audit --require-hashes --disable-pip --strict \
+	  $(HASHES:%=--requirement %) || { echo "No complete audit: either this package index keeps no list of vulnerabilities," \
 	  "or one is named above."; exit 1; }
 
 .venv/audit/ready: Makefile
 	@$(PYTHON) -m venv .venv/audit
 	@.venv/audit/bin/python -m pip install --quiet --disable-pip-version-check \
-	  pip-audit==2.10.1 pip-licenses==5.5.5 uv==0.13.9
+	  pip-audit==2.10.1 pip-licenses==5.5.5
 	@touch $@
 
-format: setup
+format: $(DEV)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
@@ -115,11 +133,11 @@ picture: setup
 
 # Material's own notice about a coming version of MkDocs would be the only warning.
 docs docs-serve: export NO_MKDOCS_2_WARNING = 1
-docs: setup
+docs: $(DEV)
 	$(BIN)/mkdocs build --strict --quiet $(ARGS)
 	@echo "site/index.html"
 
-docs-serve: setup
+docs-serve: $(DEV)
 	$(BIN)/mkdocs serve $(ARGS)
 
 video: setup

@@ -16,7 +16,8 @@ def test_hashes_are_of_the_pinned_versions():
     lines = (TOOLS / "constraints.txt").read_text().splitlines()
     pinned = {name_of(line): line.partition("==")[2] for line in lines if "==" in line}
     hashed = {}
-    for entry in re.split(r"\n(?=\S)", (TOOLS / "hashes.txt").read_text()):
+    entries = "\n".join(path.read_text().strip() for path in sorted(TOOLS.glob("hashes*.txt")))
+    for entry in re.split(r"\n(?=\S)", entries):
         pin, *hashes = re.split(r"\s+(?:;[^\\]*)?\\\s+", entry.strip())
         hashed[name_of(pin)] = pin.partition("==")[2].partition(" ")[0]
         assert hashes
