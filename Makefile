@@ -9,7 +9,7 @@ UV := $(BIN)/uv pip install --python $(BIN)/python --quiet
 ARGS ?=
 SCALE ?= quick
 
-.PHONY: help setup fly bench check test test-all attack lock audit format figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check test test-all attack lock audit format figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -25,11 +25,14 @@ help:
 	@echo "make picture remake the pictures of replays (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
 	@echo "make setup   create .venv from pinned wheels; PYTHON=python3.12 chooses another"
+	@echo "make setup-dev  add what tests, checks and the documentation need"
 	@echo "make lock    write tools/hashes*.txt anew from the pinned constraints"
 	@echo "make audit   list the licences of what is installed, and its known vulnerabilities"
 	@echo "make clean   remove .venv, replays and caches"
 
 setup: $(READY)
+
+setup-dev: $(DEV)
 
 # Every wheel must have the hash it was tested with, but torch's, which differ from index to index: a
 # CPU build on one, CUDA's gigabytes on another. uv installs in seconds what takes pip minutes; but
