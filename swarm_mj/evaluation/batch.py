@@ -73,7 +73,8 @@ def fly_batch(batch: Batch) -> BatchCosts:
         ValueError: Unknown policy, one that has changed, a bad seed, no connected team could be
             drawn, or a part of the user's own raised.
     """
-    swarm, policy = Swarm(batch.mission, batch.seeds, **batch.components.given), batch.made()
+    swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
+    policy = batch.made()
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"
@@ -86,8 +87,10 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
 
     Sums run window by window, so they round alike whatever the number of missions.
     """
-    mission, shape = swarm.mission, swarm.states.position_m.shape[:2]
-    num_windows, num_steady = mission.num_windows, mission.num_windows - mission.num_windows // 2
+    mission = swarm.mission
+    shape = swarm.states.position_m.shape[:2]
+    num_windows = mission.num_windows
+    num_steady = num_windows - num_windows // 2
     # The floor is by the mission's own range, which other channels need not have.
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)

@@ -85,7 +85,8 @@ def _result(
     merged: Mapping[tuple[Mission, str], BatchCosts],
     made_by: Mapping[str, Any],
 ) -> Result:
-    own, made = merged[regime, policy], study.make_policy(policy, regime)
+    own = merged[regime, policy]
+    made = study.make_policy(policy, regime)
     baseline = flown_name(study.compared_to, regime)
     task_cost_name, task_cost_unit = study.task_cost(regime) or (None, None)
     columns: dict[str, Any] = {

@@ -40,6 +40,12 @@ def active(swarm):
     return np.ones(shape, dtype=bool) if swarm.states.is_active is None else swarm.states.is_active
 
 
+def floor_of(swarm, known):
+    """The floor after the window that a swarm has just flown."""
+    position_m, range_m = swarm.states.position_m, swarm.mission.range_m
+    return connectivity_floor(known, position_m, range_m, swarm.now, active(swarm))
+
+
 @pytest.mark.parametrize("failure_fraction", [0.0, 0.5])
 @pytest.mark.parametrize("policy", ["mst", "random-flooding"])
 def test_costs_are_those_of_the_flight(policy, failure_fraction):
@@ -49,9 +55,9 @@ def test_costs_are_those_of_the_flight(policy, failure_fraction):
     flown, ages, floors, known = [], [], [], np.zeros((3, 6, 6))
     for window in rollout(swarm, make_policy(policy, mission, 0.3)):
         flown.append(window)
-        age, is_on = swarm.now[:, None, None] - swarm.buffers.timestamp, active(swarm)
-        place = swarm.states.position_m, mission.range_m
-        floors.append(connectivity_floor(known, *place, swarm.now, is_on))
+        age = swarm.now[:, None, None] - swarm.buffers.timestamp
+        is_on = active(swarm)
+        floors.append(floor_of(swarm, known))
         ages.extend(age[is_on[:, :, None] & is_on[:, None, :] & ~np.eye(6, dtype=bool)].tolist())
     summary = summarise(flown)
     for name in ("aoi", "velocity_variance", "hops"):
@@ -186,7 +192,6 @@ def test_no_policy_goes_below_the_floor(name, task, failing):
     swarm, known = Swarm(mission, [1, 2]), empty(2, 8)
     floors = []
     for flown in rollout(swarm, make_policy(name, mission)):
-        place = swarm.states.position_m, mission.range_m
-        floors.append(connectivity_floor(known, *place, swarm.now, active(swarm)))
+        floors.append(floor_of(swarm, known))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
     assert (np.max(floors) > 0.0) == (task != "stationary")

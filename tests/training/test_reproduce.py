@@ -34,41 +34,46 @@ fly = "--episodes 3"
 """
 
 
-def places(folder):
-    """The options that lead to a tiny experiment, and the folders of its results and runs."""
-    (folder / "fig3.toml").write_text(EXPERIMENT)
-    options = ["--figures", "fig3", "--experiments", str(folder)]
-    options += ["--results", str(folder / "results"), "--runs", str(folder / "runs")]
-    return options, folder / "results" / "quick", folder / "runs" / "quick" / "fig3"
+class Tiny:
+    """A tiny experiment in a folder: the options that lead to it, and where its files go."""
+
+    def __init__(self, folder):
+        self.file = folder / "fig3.toml"
+        self.file.write_text(EXPERIMENT)
+        self.results = folder / "results" / "quick"
+        self.runs = folder / "runs" / "quick" / "fig3"
+        self.options = ["--figures", "fig3", "--experiments", str(folder)]
+        self.options += ["--results", str(folder / "results"), "--runs", str(folder / "runs")]
+        self.seen = []  # the commands that were called, where they are replaced
+        self.broken = set()  # arguments of those that fail
+
+    def __call__(self, *more):
+        """Runs the program; returns its exit code."""
+        return program.script(program.Settings, program.run, [*self.options, *more])
 
 
 @pytest.fixture(scope="module")
 def made(forks, tmp_path_factory):
-    """A tiny experiment, made: the folders of its results and runs, and how to do it again."""
+    """A tiny experiment that was run, and how to run it again."""
     folder = tmp_path_factory.mktemp("made")
-    options, results, runs = places(folder)
-    done = forks.run(folder, FILE, *options)
+    tiny = Tiny(folder)
+    done = forks.run(folder, FILE, *tiny.options)
     assert done.returncode == 0, done.stderr
-    return results, runs, lambda: forks.run(folder, FILE, *options)
+    return tiny, lambda: forks.run(folder, FILE, *tiny.options)
 
 
 @pytest.fixture
-def folders(tmp_path):
-    return places(tmp_path)
-
-
-@pytest.fixture
-def ask(folders, made, monkeypatch):
-    """Runs the program; commands are noted, and leave what the tiny experiment's left, or fail."""
-    seen, broken = [], set()
+def tiny(tmp_path, made, monkeypatch):
+    """A tiny experiment whose commands copy what they left when it was made, or fail."""
+    tiny = Tiny(tmp_path)
 
     def command(arguments):
-        seen.append(arguments)
-        if broken & set(arguments):
+        tiny.seen.append(arguments)
+        if tiny.broken & set(arguments):
             return 130
         if arguments[0] == "train":
             run = Path(arguments[arguments.index("--out") + 1])
-            shutil.copytree(made[1] / run.name, run)
+            shutil.copytree(made[0].runs / run.name, run)
         else:
             start, end = arguments.index("--policy") + 1, arguments.index("--task")
             rows = [result(path, baseline=arguments[start]) for path in arguments[start:end]]
@@ -76,11 +81,7 @@ def ask(folders, made, monkeypatch):
         return 0
 
     monkeypatch.setattr(program, "swarm_mj", command)
-    options, *_ = folders
-    return lambda *more: program.script(program.Settings, program.run, [*options, *more]), (
-        seen,
-        broken,
-    )
+    return tiny
 
 
 def rows(path):
@@ -93,7 +94,8 @@ def names(folder):
 
 
 def test_a_tiny_experiment_from_nothing_to_its_tables(made):
-    results, runs, again = made
+    tiny, again = made
+    results, runs = tiny.results, tiny.runs
     assert names(results) == ["fig3-curves.csv", "fig3-trainings.csv", "fig3.csv"]
 
     flown = read_results(results / "fig3.csv")
@@ -125,41 +127,37 @@ def test_a_tiny_experiment_from_nothing_to_its_tables(made):
     assert "fig3.csv is there; --force makes it anew" in done.stderr
 
 
-def test_it_goes_on_where_it_broke_off(ask, folders):
-    (run, (seen, broken)), (_, results, runs) = ask, folders
-    broken.add(str(runs / "wide"))
-    assert run() == 130
-    assert not results.exists()
-    broken.clear()
-    broken.add(str(runs / "flights-1.csv"))
-    assert run() == 130
-    assert not results.exists()
-    broken.clear()
-    assert run() == 0
-    made = [Path(each[each.index("--out" if each[0] == "train" else "--csv") + 1]) for each in seen]
-    names_made = "narrow wide wide flights-0.csv flights-1.csv flights-1.csv"
-    assert " ".join(path.name for path in made) == names_made
-    assert len(names(results)) == 3
+def test_it_resumes_where_it_broke_off(tiny):
+    for broken in ("wide", "flights-1.csv"):
+        tiny.broken = {str(tiny.runs / broken)}
+        assert tiny() == 130
+        assert not tiny.results.exists()
+    tiny.broken.clear()
+    assert tiny() == 0
+    outputs = [
+        Path(each[each.index("--out" if each[0] == "train" else "--csv") + 1]).name
+        for each in tiny.seen
+    ]
+    assert " ".join(outputs) == "narrow wide wide flights-0.csv flights-1.csv flights-1.csv"
+    assert len(names(tiny.results)) == 3
 
 
-def test_runs_of_another_experiment_or_commit_are_not_gone_on_with(ask, folders, tmp_path, capsys):
-    (run, (seen, broken)), (_, results, runs) = ask, folders
-    broken.add(str(runs / "narrow"))
-    assert run() == 130
-    path = tmp_path / "fig3.toml"
-    path.write_text(EXPERIMENT.replace("--episodes 2", "--episodes 1"))
-    assert run() == 2
+def test_runs_of_another_experiment_or_commit_are_not_resumed(tiny, capsys):
+    tiny.broken.add(str(tiny.runs / "narrow"))
+    assert tiny() == 130
+    tiny.file.write_text(EXPERIMENT.replace("--episodes 2", "--episodes 1"))
+    assert tiny() == 2
     said = capsys.readouterr().err.splitlines()[-1]
-    assert str(runs) in said
+    assert str(tiny.runs) in said
     assert "give --force to start over" in said
-    begun = json.loads((runs / "begun.json").read_text())
-    path.write_text(EXPERIMENT)
-    (runs / "begun.json").write_text(json.dumps(begun | {"commit": "abc"}))
-    assert run() == 2
-    assert len(seen) == 1
-    assert run("--force") == 130
-    assert json.loads((runs / "begun.json").read_text()) == begun
-    assert not results.exists()
+    begun = json.loads((tiny.runs / "begun.json").read_text())
+    tiny.file.write_text(EXPERIMENT)
+    (tiny.runs / "begun.json").write_text(json.dumps(begun | {"commit": "abc"}))
+    assert tiny() == 2
+    assert len(tiny.seen) == 1
+    assert tiny("--force") == 130
+    assert json.loads((tiny.runs / "begun.json").read_text()) == begun
+    assert not tiny.results.exists()
 
 
 def test_own_options_take_the_place_of_shared_ones():
@@ -167,17 +165,16 @@ def test_own_options_take_the_place_of_shared_ones():
     assert typed == ["--robots", "40", "--linear", "--seed", "2"]
 
 
-def test_a_folder_of_something_else_is_left_alone(ask, folders, capsys):
-    (run, (seen, _)), (*_, results, runs) = ask, folders
-    (runs / "mine").mkdir(parents=True)
-    (results / "fig3.csv").parent.mkdir(parents=True)
-    (results / "fig3.csv").write_text("kept\n")
+def test_a_folder_of_something_else_is_left_alone(tiny, capsys):
+    (tiny.runs / "mine").mkdir(parents=True)
+    tiny.results.mkdir(parents=True)
+    (tiny.results / "fig3.csv").write_text("kept\n")
     for force in ((), ("--force",)):
-        assert run(*force) == 2
+        assert tiny(*force) == 2
         assert "is there, but no runs of this; name other --runs" in capsys.readouterr().err
-    assert (runs / "mine").exists()
-    assert (results / "fig3.csv").read_text() == "kept\n"
-    assert seen == []
+    assert (tiny.runs / "mine").exists()
+    assert (tiny.results / "fig3.csv").read_text() == "kept\n"
+    assert tiny.seen == []
 
 
 @pytest.mark.parametrize(
@@ -192,12 +189,11 @@ def test_a_folder_of_something_else_is_left_alone(ask, folders, capsys):
         ('["GNN"]', "1", "Expected `array`"),
     ],
 )
-def test_a_wrong_experiment_is_refused_before_any_work(ask, tmp_path, capsys, old, new, said):
-    run, (seen, _) = ask
-    (tmp_path / "fig3.toml").write_text(EXPERIMENT.replace(old, new))
-    assert run() == 2
+def test_a_wrong_experiment_is_refused_before_any_work(tiny, capsys, old, new, said):
+    tiny.file.write_text(EXPERIMENT.replace(old, new))
+    assert tiny() == 2
     assert said in capsys.readouterr().err
-    assert seen == []
+    assert tiny.seen == []
 
 
 @pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
