@@ -17,17 +17,6 @@ def squared_distance(position_m: Float[np.ndarray, "N 2"], i: int, j: int) -> fl
 
 
 @compiled()
-def overlaps_earlier(position_m: Float[np.ndarray, "N 2"], apart_m: float) -> Bool[np.ndarray, "N"]:
-    """Return which robots are nearer than that [m] to one of a smaller index."""
-    num_robots = position_m.shape[0]
-    overlaps = np.zeros(num_robots, dtype=np.bool_)
-    for j in range(num_robots):
-        for i in range(j):
-            overlaps[j] |= squared_distance(position_m, i, j) < apart_m * apart_m
-    return overlaps
-
-
-@compiled()
 def gather_connected(
     position_m: Float[np.ndarray, "N 2"],
     range_m: float,

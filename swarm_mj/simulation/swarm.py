@@ -12,7 +12,6 @@ from swarm_mj.control.motion import Controller, controller_of, costed, initial_v
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
 from swarm_mj.mission.components import Components, is_ours
-from swarm_mj.mission.geometry import overlaps_earlier
 from swarm_mj.mission.placement import connected_positions, draw_survivors
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
@@ -119,7 +118,9 @@ class Swarm:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
         is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._physics.obstacles)
         if self.mission.collide:
-            is_blocked |= overlaps_earlier(position_m, 2.0 * ROBOT_RADIUS_M)
+            apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
+            overlaps = np.tril(apart_m < 2.0 * ROBOT_RADIUS_M, k=-1)  # the first one may stay
+            is_blocked |= np.any(overlaps, axis=1)
         return is_blocked
 
     @property

@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
-from swarm_mj.mission.geometry import ROOT, gather_connected, overlaps_earlier, spanning_tree
+from swarm_mj.mission.geometry import ROOT, gather_connected, spanning_tree
 
 # On a line, 10 m apart but for a gap, as robots 3, 0, 4, 1, 2: the middle one is robot 4.
 LINE_M = np.array([[10.0, 0.0], [45.0, 0.0], [55.0, 0.0], [0.0, 0.0], [20.0, 0.0]])
@@ -73,8 +73,3 @@ def test_iv_c_root_is_a_centre_of_the_tree(seed, num_robots):
         while parent[reached] != ROOT:
             reached, hops = parent[reached], hops + 1
             assert hops <= radius
-
-
-def test_who_overlaps_a_robot_before_it():
-    position_m = np.array([[0.0, 0.0], [3.0, 0.0], [0.6, 0.7], [3.0, 1.0], [2.5, 0.8]])
-    assert overlaps_earlier(position_m, 1.0).tolist() == [False, False, True, False, True]
