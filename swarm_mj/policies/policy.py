@@ -2,9 +2,10 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
@@ -93,6 +94,36 @@ class BroadcastPolicy(DecentralisedPolicy):
                 f"shape {transmits.shape}"
             )
         return np.where(transmits, BROADCAST, views.silence)
+
+
+class TeamView(NamedTuple):
+    """The views of one mission's robots, side by side: row i of every array is robot i's own."""
+
+    now: float  # t on the synchronised clock [windows]
+    is_known: Bool[np.ndarray, "N N"]  # whether i knows anything of j
+    timestamp: Float[np.ndarray, "N N"]  # T^{i,j} [windows]
+    position_m: Float[np.ndarray, "N N 2"]  # M^{i,j} [m]
+    velocity_mps: Float[np.ndarray, "N N 2"]  # M^{i,j} [m/s]
+    parent: Int[np.ndarray, "N N"]  # P^{i,j}
+    heard: Int[np.ndarray, "N"]  # whom i decoded in the last slot; itself: nobody
+
+
+def team_views(views: LocalViews) -> list[TeamView]:
+    """Return the views mission by mission, for policies that remember each on its own."""
+    buffers, is_known = views.buffers, views.buffers.is_known
+    heard = views.phases[-1].heard if views.phases else views.silence
+    return [
+        TeamView(
+            now=float(views.now[b]),
+            is_known=is_known[b],
+            timestamp=buffers.timestamp[b],
+            position_m=buffers.position_m[b],
+            velocity_mps=buffers.velocity_mps[b],
+            parent=buffers.parent[b],
+            heard=heard[b],
+        )
+        for b in range(len(views.now))
+    ]
 
 
 class CentralisedPolicy(Policy, ABC):

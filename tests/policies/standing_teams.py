@@ -8,10 +8,21 @@ import numpy as np
 from swarm_mj.mission import Mission
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.policy import team_views
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import SLOT_WINDOWS, transmit, window
+from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews, transmit, window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
+
+
+def view_of(timestamp, position_m=0.0, velocity_mps=0.0, *, now=0.0, heard=None):
+    """The view of robots that know this; they decoded nobody unless said otherwise."""
+    buffers = empty_buffers(1, len(timestamp))
+    buffers.timestamp[0], buffers.position_m[0] = timestamp, position_m
+    buffers.velocity_mps[0] = velocity_mps
+    views = LocalViews(buffers=buffers, now=np.array([now]), phases=())
+    (view,) = team_views(views)
+    return view if heard is None else view._replace(heard=heard)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -7,10 +7,10 @@ the clock. What a robot hears meanwhile can only keep it silent.
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.policies.policy import TeamView
 from swarm_mj.protocol.window import SLOTS_PER_WINDOW
 
 Purpose = Literal["discovery", "search", "plan"]
@@ -53,25 +53,23 @@ class Discovery:
         is_turn = (slot // SLOTS_PER_WINDOW) % self._settings.search_every_windows == 0
         return "search" if is_turn and not np.all(is_fresh) else "plan"
 
-    def transmits(self, slot: int, buffers: Buffers, b: int) -> Bool[np.ndarray, "N"]:
+    def transmits(self, slot: int, view: TeamView) -> Bool[np.ndarray, "N"]:
         """Return whose turn it is, except robots that know one nearby that comes before them."""
         group = self._groups[slot % len(self._groups)]
         transmits = np.zeros(len(self._order), dtype=bool)
         for turn, i in enumerate(group.tolist()):
-            here_m = buffers.position_m[b, i, i]
-            is_near = self._are_near(buffers, b, i, here_m, self._settings.polite_ranges)
+            here_m = view.position_m[i, i]
+            is_near = self._are_near(view, i, here_m, self._settings.polite_ranges)
             transmits[i] = not np.any(is_near[group[:turn]])
         return transmits
 
     def seeks(
         self,
         slot: int,
-        buffers: Buffers,
-        b: int,
+        view: TeamView,
         *,
         is_fresh: Bool[np.ndarray, "N"],
         was_fresh: Bool[np.ndarray, "N N"],
-        heard: Int[np.ndarray, "N"],
     ) -> Bool[np.ndarray, "N"]:
         """Return who transmits: one robot in a window's first slot, those that hear it in the next.
 
@@ -88,17 +86,17 @@ class Discovery:
             return transmits
         missing = self._order[~is_fresh[self._order]]
         transmits[missing[turn % len(missing)]] = True
-        has_found = (heard != everyone) & ~was_fresh[everyone, heard]
+        has_found = (view.heard != everyone) & ~was_fresh[everyone, view.heard]
         for i in np.flatnonzero(has_found).tolist():
-            there_m = buffers.position_m[b, i, heard[i]]
-            could = was_fresh[i] & self._are_near(buffers, b, i, there_m, 1.0)
+            there_m = view.position_m[i, view.heard[i]]
+            could = was_fresh[i] & self._are_near(view, i, there_m, 1.0)
             transmits[i] = not np.any(could & (self._place < self._place[i]))
         return transmits
 
     def _are_near(
-        self, buffers: Buffers, b: int, i: int, position_m: Float[np.ndarray, "2"], ranges: float
+        self, view: TeamView, i: int, position_m: Float[np.ndarray, "2"], ranges: float
     ) -> Bool[np.ndarray, "N"]:
         """Return the robots that i knows within some ranges of a place."""
-        apart_m = buffers.position_m[b, i] - position_m
+        apart_m = view.position_m[i] - position_m
         is_near = np.hypot(apart_m[:, 0], apart_m[:, 1]) < ranges * self._range_m
-        return is_near & buffers.is_known[b, i]
+        return is_near & view.is_known[i]

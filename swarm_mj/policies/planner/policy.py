@@ -30,8 +30,8 @@ from swarm_mj.policies.planner.discovery import Discovery
 from swarm_mj.policies.planner.plan import Plan, epoch_plan
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, snapshot_fields, take_snapshots
-from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.packets import (
     PacketField,
     bits_per_second,
@@ -90,11 +90,11 @@ class Planner(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by its plan or by the discovery."""
-        return np.stack([self.transmits_in(views, b) for b in range(len(self._teams))])
+        return np.stack([self.transmits_in(view, b) for b, view in enumerate(team_views(views))])
 
-    def transmits_in(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
-        """Return the same in one mission alone."""
-        return self._teams[b].transmits(views, b)
+    def transmits_in(self, view: TeamView, b: int) -> Bool[np.ndarray, "N"]:
+        """Return the same in mission b alone."""
+        return self._teams[b].transmits(view)
 
 
 class _Team:
@@ -124,22 +124,20 @@ class _Team:
         self._planned_by = self._everyone  # the owner of i's plan when it took its upcoming one
         self._before: list[Plan | None] = []  # what i followed in the last epoch
 
-    def transmits(self, views: LocalViews, b: int) -> Bool[np.ndarray, "N"]:
-        """Return who transmits in this slot of mission b."""
-        now = float(views.now[b])
-        self._first = now if self._first is None else self._first
-        slot = round((now - self._first) / SLOT_WINDOWS)
-        heard = views.phases[-1].heard[b] if views.phases else self._everyone
+    def transmits(self, view: TeamView) -> Bool[np.ndarray, "N"]:
+        """Return who transmits in this slot."""
+        self._first = view.now if self._first is None else self._first
+        slot = round((view.now - self._first) / SLOT_WINDOWS)
         held = self._held()
         # Packets of the last slot carry snapshots of the epoch that may end now, so they are
         # adopted before the next one begins.
         for snapshots in (self._current, self._upcoming):
             if snapshots is not None:
-                snapshots.adopt(heard)
+                snapshots.adopt(view.heard)
         if slot >= SLOTS_PER_WINDOW * self._end:
-            self._begin_epoch(views.buffers, b, now)
+            self._begin_epoch(view)
         if (current := self._current) is None:
-            return self._discovery.transmits(slot, views.buffers, b)
+            return self._discovery.transmits(slot, view)
         transmits = np.zeros(len(self._everyone), dtype=bool)
         was_fresh = current.is_fresh[held]
         for owner in np.unique(current.held).tolist():
@@ -148,11 +146,9 @@ class _Team:
             is_fresh = current.is_fresh[owner]
             purpose = self._discovery.purpose(slot, current.is_known[owner], is_fresh)
             if purpose == "discovery":
-                chosen = self._discovery.transmits(slot, views.buffers, b)
+                chosen = self._discovery.transmits(slot, view)
             elif purpose == "search":
-                chosen = self._discovery.seeks(
-                    slot, views.buffers, b, is_fresh=is_fresh, was_fresh=was_fresh, heard=heard
-                )
+                chosen = self._discovery.seeks(slot, view, is_fresh=is_fresh, was_fresh=was_fresh)
             else:
                 chosen = plan.transmits(slot - SLOTS_PER_WINDOW * self._begin)
             follows = current.held == owner
@@ -163,12 +159,12 @@ class _Team:
         """Return whose snapshot each robot flies by, itself if it has none yet."""
         return self._everyone if self._current is None else self._current.held.copy()
 
-    def _begin_epoch(self, buffers: Buffers, b: int, now: float) -> None:
+    def _begin_epoch(self, view: TeamView) -> None:
         """Fly by the snapshots taken for this epoch, and take those for the next."""
         self._epoch += 1
         self._before = [self._plans.get(owner) for owner in self._planned_by.tolist()]
         self._plans = {}
-        is_common = self._epoch == 0 and _is_common(buffers, b)
+        is_common = self._epoch == 0 and _is_common(view)
         self._num_skipped += is_common  # there is nothing to discover
         epoch, num_robots = self._epoch + self._num_skipped, len(self._everyone)
         length = epoch_windows(epoch, num_robots, self._settings)
@@ -176,12 +172,7 @@ class _Team:
 
         def take(windows_ahead: float) -> Snapshots:
             taken = take_snapshots(
-                buffers,
-                b,
-                self._settings,
-                now=now,
-                window_s=self._window_s,
-                windows_ahead=windows_ahead,
+                view, self._settings, window_s=self._window_s, windows_ahead=windows_ahead
             )
             if is_common:
                 taken.held[:] = 0  # all are the same
@@ -217,10 +208,9 @@ class _Team:
         return self._plans[owner]
 
 
-def _is_common(buffers: Buffers, b: int) -> bool:
+def _is_common(view: TeamView) -> bool:
     """Return whether all robots have the same complete picture of one moment."""
-    timestamp = buffers.timestamp[b]
-    return bool(np.all(buffers.is_known[b]) and np.all(timestamp == timestamp[0, 0]))
+    return bool(np.all(view.is_known) and np.all(view.timestamp == view.timestamp[0, 0]))
 
 
 def epoch_windows(epoch: int, num_robots: int, settings: PlannerSettings) -> int:

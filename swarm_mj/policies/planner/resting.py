@@ -37,7 +37,7 @@ from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import snapshot_fields
-from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.tdma import SpatialTdma
 from swarm_mj.protocol.packets import PacketField, fits, packet_of
 from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
@@ -105,14 +105,14 @@ class RestingPlanner(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by the schedule it knows or in its turn."""
-        transmits = self._turns.transmits(views)
+        transmits, each = self._turns.transmits(views), team_views(views)
         for b, team in enumerate(self._teams):
-            transmits[b] = team.transmits(views, b, transmits[b])
+            transmits[b] = team.transmits(each[b], transmits[b])
         if self._moving is not None:
             knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
             self._has_moved |= np.any(knows_motion, axis=1)
             for b in np.flatnonzero(self._has_moved).tolist():
-                by_snapshot = self._moving.transmits_in(views, b)
+                by_snapshot = self._moving.transmits_in(each[b], b)
                 transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]
         return transmits
 
@@ -146,34 +146,30 @@ class _Team:
         self._current_begin = 0  # the slot since when robots fly by these tables
         self._next: Tables | None = None
 
-    def transmits(
-        self, views: LocalViews, b: int, in_turn: Bool[np.ndarray, "N"]
-    ) -> Bool[np.ndarray, "N"]:
-        """Return who transmits in a slot of mission b: by its plan or, if it cannot plan, in turn.
+    def transmits(self, view: TeamView, in_turn: Bool[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
+        """Return who transmits in this slot: by its plan or, if it cannot plan, in turn.
 
         Every slot is asked for once, in order.
         """
-        buffers, now = views.buffers, round(float(views.now[b]) / SLOT_WINDOWS)
+        now = round(view.now / SLOT_WINDOWS)
         self._first_slot = now if self._first_slot is None else self._first_slot
         slot = now - self._first_slot
-        knows_motion = np.any(buffers.velocity_mps[b], axis=(1, 2))
-        can_plan = np.all(buffers.is_known[b], axis=1) & ~knows_motion
+        can_plan = np.all(view.is_known, axis=1) & ~np.any(view.velocity_mps, axis=(1, 2))
         if self._learns and slot > 0:
             # [j, i]: the last slot of which j knows what i observed. A packet's news of its sender
             # is from before the slot in which it was sent.
-            observed = np.rint(buffers.timestamp[b] * SLOTS_PER_WINDOW).astype(np.int64)
-            heard = views.phases[-1].heard[b] if views.phases else self._everyone
-            self._learn(slot, heard, observed - 2 - self._first_slot)
+            observed = np.rint(view.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
+            self._learn(slot, view.heard, observed - 2 - self._first_slot)
             self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
         members: dict[tuple[bytes, int | None], list[int]] = {}
         for i in np.flatnonzero(can_plan).tolist():
-            key = buffers.position_m[b, i].tobytes(), self._owner(i)
+            key = view.position_m[i].tobytes(), self._owner(i)
             members.setdefault(key, []).append(i)
         self._followed = []
         transmits = in_turn.copy()
         for key, robots in members.items():
             if key not in self._flights:
-                self._flights[key] = self._flight(buffers.position_m[b, robots[0]], key[1])
+                self._flights[key] = self._flight(view.position_m[robots[0]], key[1])
             flight = self._flights[key]
             planned = flight.plan.transmits(slot - flight.begin)
             transmits[robots] = planned[robots]

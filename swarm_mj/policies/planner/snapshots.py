@@ -12,7 +12,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.policies.policy import TeamView
 from swarm_mj.protocol.packets import POSITION_BITS, PacketField, age, identity, position, times
 
 NUM_SENT = 2  # snapshots or tables in a packet: the current one, and the best of the next
@@ -46,23 +46,16 @@ class Snapshots(Proposals):
 
 
 def take_snapshots(
-    buffers: Buffers,
-    b: int,
-    settings: PlannerSettings,
-    *,
-    now: float,
-    window_s: float,
-    windows_ahead: float,
+    view: TeamView, settings: PlannerSettings, *, window_s: float, windows_ahead: float
 ) -> Snapshots:
-    """Return every robot's snapshot in mission b, row i from its own buffer alone.
+    """Return every robot's snapshot, row i from its own buffer alone.
 
     They are taken for the middle of an epoch some windows ahead. The best has most robots fresh,
     then the least mean age of these, then the lowest identity.
     """
-    is_known, timestamp = buffers.is_known[b], buffers.timestamp[b]
-    position_m, velocity_mps = buffers.position_m[b], buffers.velocity_mps[b]
+    is_known, velocity_mps = view.is_known, view.velocity_mps
     num_robots, num_known = len(is_known), np.sum(is_known, axis=1)
-    age = np.where(is_known, now - timestamp, 0.0)
+    age = np.where(is_known, view.now - view.timestamp, 0.0)
     ahead = age + windows_ahead
     mean_mps = np.sum(velocity_mps * is_known[..., None], axis=1) / num_known[:, None]
     apart_mps = (velocity_mps - mean_mps[:, None]) * is_known[..., None]
@@ -78,9 +71,9 @@ def take_snapshots(
     return Snapshots(
         is_known=is_known,
         is_fresh=is_fresh | is_divided[:, None],
-        position_m=position_m + velocity_mps * steady[..., None] * window_s,
+        position_m=view.position_m + velocity_mps * steady[..., None] * window_s,
         position_std_m=position_std_m,
-        timestamp=timestamp.copy(),
+        timestamp=view.timestamp.copy(),
         rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
         held=np.arange(num_robots),
     )

@@ -20,14 +20,13 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
-from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.sotdma import slot_table
 from swarm_mj.policies.sotdma.frame import Rule, chosen, first_slots, frame_slots
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
-from swarm_mj.policies.tdma import SpatialTdma, draw_order, slot_of
-from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW, LocalViews
+from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.radio.power_law import powers_between, write_powers
 
@@ -61,63 +60,57 @@ class SelfOrganisedTdma(BroadcastPolicy):
         """Draw every mission's order; arguments as in `Policy.start`."""
         self._turns.start(num_robots, rngs)
         orders = draw_order(num_robots, rngs)
-        self._teams = [SotdmaTeam(order, self._belief) for order in orders]
+        self._teams = [
+            SotdmaTeam(order, self._belief, reads_packets=self._reads_packets) for order in orders
+        ]
         self._uniform = Stream(rngs, uniform, (num_robots,))
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who owns the slot, or is in need where nobody does; at first, whose turn it is."""
-        slot, transmits = slot_of(views.now), np.zeros(views.silence.shape, dtype=bool)
+        transmits = np.zeros(views.silence.shape, dtype=bool)
         if any(team.table is None for team in self._teams):
             transmits = self._turns.transmits(views)
-        heard = views.phases[-1].heard if views.phases else views.silence
         draw = self._uniform.next()
-        for b, team in enumerate(self._teams):
-            read = heard[b] if self._reads_packets else views.silence[b]
-            transmits[b] = team.transmits(
-                int(slot[b]), transmits[b], views.buffers, b, heard=read, draw=draw[b]
-            )
+        for b, (team, view) in enumerate(zip(self._teams, team_views(views), strict=True)):
+            transmits[b] = team.transmits(view, transmits[b], draw[b])
         return transmits
 
 
 class SotdmaTeam:
     """Robots that choose their slots, each by its own beliefs."""
 
-    def __init__(self, order: Int[np.ndarray, "N"], belief: Belief) -> None:
+    def __init__(
+        self, order: Int[np.ndarray, "N"], belief: Belief, *, reads_packets: bool = True
+    ) -> None:
         """Prepare the team, whose robots choose in this order."""
-        self._order = order
+        self._order, self._reads_packets = order, reads_packets
         self._law = belief.law_over_noise(len(order))
         self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
         self._first_slot: int | None = None  # of the first frame, known from the first decision on
         self.table: SlotTable | None = None  # there is none before the first frame
 
     def transmits(
-        self,
-        slot: int,
-        in_turn: Bool[np.ndarray, "N"],
-        buffers: Buffers,
-        b: int,
-        heard: Int[np.ndarray, "N"],
-        draw: Float[np.ndarray, "N"],
+        self, view: TeamView, in_turn: Bool[np.ndarray, "N"], draw: Float[np.ndarray, "N"]
     ) -> Bool[np.ndarray, "N"]:
-        """Return who transmits in the slot that begins in mission b; ask slot by slot.
+        """Return who transmits in the slot that begins; ask slot by slot.
 
-        Before the first frame these are the robots in turn. `heard` is the sender that each robot
-        decoded in the last slot, itself: none; `draw` is on [0, 1), for contention.
+        Before the first frame these are the robots in turn; `draw` is on [0, 1), for contention.
         """
-        rule = self._rule
+        rule, slot = self._rule, round(view.now / SLOT_WINDOWS)
         if self._first_slot is None:
             self._first_slot = slot + rule.first_rounds * len(self._order)
         slot -= self._first_slot
         if slot < 0:
             return in_turn
-        is_known = buffers.is_known[b] | np.eye(len(self._order), dtype=bool)
+        is_known = view.is_known | np.eye(len(self._order), dtype=bool)
         if self.table is None:
-            slots = self._first_slots(buffers.position_m[b], is_known)
+            slots = self._first_slots(view.position_m, is_known)
             self.table = slot_table.empty_table(slots, rule.num_slots)
         # A robot observes itself as it transmits, so T says in which slot it last did.
-        ends = np.rint(SLOTS_PER_WINDOW * buffers.timestamp[b]).astype(np.int64)
+        ends = np.rint(SLOTS_PER_WINDOW * view.timestamp).astype(np.int64)
         table, known = self.table, ends - 1 - self._first_slot
-        slot_table.read_packets(table, heard, known, buffers.parent[b], slot - 1, rule)
+        if self._reads_packets:
+            slot_table.read_packets(table, view.heard, known, view.parent, slot - 1, rule)
         slot_table.read_slots(table, known, rule)
         for i in self._choosers(slot):
             table.slots[i, i] = chosen(
@@ -127,12 +120,12 @@ class SotdmaTeam:
                 is_known[i],
                 slot_table.marks(table, i, slot, rule),
                 self._chose_lately(slot),
-                self._powers(buffers.position_m[b, i], is_known[i]),
+                self._powers(view.position_m[i], is_known[i]),
                 rule,
             )
         place = place_of(slot, rule)
         if place == NO_PLACE:
-            is_near = is_known & self._is_in_range(buffers.position_m[b])
+            is_near = is_known & self._is_in_range(view.position_m)
             needs = slot_table.are_in_need(table, known, is_near, slot, rule)
             transmits = needs & (draw < rule.contention_probability)
         else:

@@ -2,10 +2,10 @@ import math
 
 import numpy as np
 import pytest
+from standing_teams import view_of
 
 from swarm_mj.policies.planner.discovery import Discovery
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.protocol.buffers import empty_buffers
 
 RANGE_M = 100.0
 NUM_ROBOTS = 6
@@ -37,14 +37,12 @@ def order_of(seed):
     return np.random.default_rng(seed).permutation(NUM_ROBOTS).tolist()
 
 
-def at_places(position_m, knows):
-    """Buffers at t = 1 in which robot i has heard of itself and of whom it knows."""
-    buffers = empty_buffers(1, len(position_m))
-    for i in range(len(position_m)):
-        for k in {i, *knows.get(i, ())}:
-            buffers.timestamp[0, i, k] = 1.0
-            buffers.position_m[0, i, k] = position_m[k]
-    return buffers
+def at_places(position_m, knows, heard=None):
+    """A view at t = 1 in which robot i has heard of itself and of whom it knows."""
+    timestamp = np.eye(len(position_m))
+    for i, known in knows.items():
+        timestamp[i, list(known)] = 1.0
+    return view_of(timestamp, position_m * timestamp[..., None], now=1.0, heard=heard)
 
 
 def strangers(num_robots):
@@ -56,7 +54,7 @@ def round_of_transmitters(turns, num_robots, first):
     """Who transmits, slot by slot, until as many spoke as there are robots."""
     transmitters, slot = [], first
     while sum(map(len, transmitters)) < num_robots:
-        transmits = turns.transmits(slot, strangers(num_robots), 0)
+        transmits = turns.transmits(slot, strangers(num_robots))
         transmitters.append(np.flatnonzero(transmits).tolist())
         slot += 1
     return transmitters
@@ -105,7 +103,7 @@ def test_robots_that_know_one_near_them_that_comes_before_are_silent(
     position_m = np.zeros((NUM_ROBOTS, 2))
     position_m[first] = [0.6 * apart_m, 0.8 * apart_m]
     known = {first: [then], then: [first] * knows_first + [bystander] * knows_bystander}
-    speaks = turns.transmits(0, at_places(position_m, known), 0)
+    speaks = turns.transmits(0, at_places(position_m, known))
     assert (speaks[first], speaks[then]) == (True, transmits)
 
 
@@ -139,10 +137,10 @@ def sought(slot, lost, heard=None, places_m=None, knows=None, was_missing=None, 
     for j, i in (heard or {}).items():
         decoded[j] = i
     position_m = np.zeros((NUM_ROBOTS, 2)) if places_m is None else places_m
-    buffers = at_places(position_m, knows or {})
+    view = at_places(position_m, knows or {}, heard=decoded)
     was_fresh = np.tile(fresh(*(lost if was_missing is None else was_missing)), (NUM_ROBOTS, 1))
     transmits = discovery_of(NUM_ROBOTS, 1.0, seed).seeks(
-        slot, buffers, 0, is_fresh=fresh(*lost), was_fresh=was_fresh, heard=decoded
+        slot, view, is_fresh=fresh(*lost), was_fresh=was_fresh
     )
     return np.flatnonzero(transmits).tolist()
 

@@ -10,7 +10,7 @@ import pytest
 from decentralised_reference import planned as planned_at_once
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from standing_teams import flooded_team
+from standing_teams import flooded_team, view_of
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.planner.plan import (
@@ -22,7 +22,6 @@ from swarm_mj.policies.planner.plan import (
 )
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import take_snapshots
-from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.radio.links import decode_curves, doubtful, links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import Belief, radio_of
 
@@ -35,22 +34,19 @@ SETTINGS = PlannerSettings()
 
 def snapshots_of(team, seed):
     """Beliefs of robots that heard of most others, some of them long ago."""
-    rng, num_robots = np.random.default_rng(seed), team.num_robots
-    shape, buffers = (num_robots, num_robots), empty_buffers(1, num_robots)
+    rng, shape = np.random.default_rng(seed), (team.num_robots, team.num_robots)
     timestamp = NOW - rng.integers(0, 2 * int(NOW), shape) / 2
     timestamp *= rng.random(shape) < 0.8
     np.fill_diagonal(timestamp, NOW)
-    buffers.timestamp[0] = timestamp
-    buffers.position_m[0] = team.position_m + rng.normal(0.0, 20.0, (*shape, 2))
-    buffers.velocity_mps[0] = rng.uniform(-3.0, 3.0, (*shape, 2))
-    return take_snapshots(buffers, 0, AGED, now=NOW, window_s=0.1, windows_ahead=15.0)
+    position_m = team.position_m + rng.normal(0.0, 20.0, (*shape, 2))
+    view = view_of(timestamp, position_m, rng.uniform(-3.0, 3.0, (*shape, 2)), now=NOW)
+    return take_snapshots(view, AGED, window_s=0.1, windows_ahead=15.0)
 
 
 def true_snapshots(team):
     """Everyone is known, fresh, at rest, and where it is believed to be."""
-    buffers = empty_buffers(1, team.num_robots)
-    buffers.timestamp[...], buffers.position_m[...] = 1.0, team.position_m
-    return take_snapshots(buffers, 0, SETTINGS, now=9.0, window_s=0.1, windows_ahead=15.0)
+    view = view_of(np.ones_like(team.timestamp), team.position_m, now=9.0)
+    return take_snapshots(view, SETTINGS, window_s=0.1, windows_ahead=15.0)
 
 
 def team_of(num_robots, seed):

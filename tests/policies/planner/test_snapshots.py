@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from standing_teams import view_of
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -13,7 +14,6 @@ from swarm_mj.policies.planner.snapshots import (
     snapshot_fields,
     take_snapshots,
 )
-from swarm_mj.protocol.buffers import empty_buffers
 
 NOW = 20.0
 
@@ -29,18 +29,10 @@ def believing(fresh_windows):
     )
 
 
-def buffers_of(position_m, velocity_mps, timestamp):
-    """One mission's, that hold this."""
-    buffers = empty_buffers(1, len(timestamp))
-    buffers.position_m[0], buffers.velocity_mps[0] = position_m, velocity_mps
-    buffers.timestamp[0] = timestamp
-    return buffers
-
-
 def taken_from(position_m, velocity_mps, timestamp, windows_ahead, settings):
     """Snapshots at t = 20, in windows of 0.1 s."""
-    buffers = buffers_of(position_m, velocity_mps, timestamp)
-    return take_snapshots(buffers, 0, settings, now=NOW, window_s=0.1, windows_ahead=windows_ahead)
+    view = view_of(timestamp, position_m, velocity_mps, now=NOW)
+    return take_snapshots(view, settings, window_s=0.1, windows_ahead=windows_ahead)
 
 
 def taken_by_hand(fresh_windows=20.0):
@@ -142,12 +134,10 @@ def test_where_nobody_moves_and_many_are_stale_all_count_as_fresh():
 def test_a_snapshot_does_not_change_with_the_buffer():
     rng = np.random.default_rng(3)
     timestamp = np.where(np.eye(5) > 0, NOW, rng.integers(0, 40, (5, 5)) / 2)
-    buffers = buffers_of(rng.random((5, 5, 2)), rng.random((5, 5, 2)), timestamp)
-    snapshots = take_snapshots(
-        buffers, 0, believing(9.0), now=NOW, window_s=0.1, windows_ahead=15.0
-    )
+    view = view_of(timestamp, rng.random((5, 5, 2)), rng.random((5, 5, 2)), now=NOW)
+    snapshots = take_snapshots(view, believing(9.0), window_s=0.1, windows_ahead=15.0)
     before = copy.deepcopy(snapshots)
-    for array in vars(buffers).values():
+    for array in (view.timestamp, view.position_m, view.velocity_mps):
         array[:] = 0
     for field in fields(Snapshots):
         np.testing.assert_array_equal(getattr(snapshots, field.name), getattr(before, field.name))

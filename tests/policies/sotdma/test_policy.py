@@ -4,6 +4,7 @@ import math
 import numpy as np
 import pytest
 from decentralised_reference import transmitters
+from standing_teams import view_of
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
@@ -11,7 +12,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.sotdma.frame import frame_slots
 from swarm_mj.policies.sotdma.policy import SotdmaTeam
 from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, place_of
-from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.window import SLOT_WINDOWS
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
@@ -127,22 +128,23 @@ RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
 
 def row():
     """All know where all are, 200 m apart, since t = 1, and observe themselves now, at t = 5."""
-    buffers = empty_buffers(1, NUM_ROBOTS)
-    buffers.timestamp[...] = 1.0
-    buffers.timestamp[0, SILENCE, SILENCE] = 5.0
-    buffers.position_m[..., 0] = 200.0 * SILENCE
-    return buffers
+    timestamp = np.where(np.eye(NUM_ROBOTS), 5.0, 1.0)
+    return view_of(timestamp, np.outer(200.0 * SILENCE, [1.0, 0.0]))
 
 
-def begun(buffers):
+def asked(team, view, slot, in_turn=SILENCE < 0, draw=NO_DRAW):
+    """Who transmits in a slot by what robots know."""
+    return team.transmits(view._replace(now=slot * SLOT_WINDOWS), in_turn, draw)
+
+
+def begun(view):
     """A team in its first frame."""
     team = SotdmaTeam(ORDER, Belief(radio=RADIO))
     in_turn = SILENCE == 3
     for slot in (0, FIRST - 1):
-        transmits = team.transmits(slot, in_turn, buffers, 0, SILENCE, NO_DRAW)
-        np.testing.assert_array_equal(transmits, in_turn)
+        np.testing.assert_array_equal(asked(team, view, slot, in_turn), in_turn)
     assert team.table is None
-    team.transmits(FIRST, in_turn, buffers, 0, SILENCE, NO_DRAW)
+    asked(team, view, FIRST, in_turn)
     assert team.table is not None
     return team
 
@@ -165,14 +167,14 @@ def test_everyone_chooses_once_in_four_frames_but_not_in_the_first():
 
 def test_robots_that_believe_the_same_work_out_the_same_first_slots():
     """The one that believes otherwise may work out others; all own the slots of their own table."""
-    buffers = row()
-    buffers.position_m[0, 5] = buffers.position_m[0, 5, ::-1]
-    team = begun(buffers)
+    view = row()
+    view.position_m[5] = view.position_m[5, ::-1].copy()
+    team = begun(view)
     slots = team.table.slots
     others = np.delete(SILENCE, 5)
     assert np.all(slots[others] == slots[0])
     for slot in range(FIRST + 1, FIRST + 11):
-        transmits = team.transmits(slot, SILENCE < 0, buffers, 0, SILENCE, NO_DRAW)
+        transmits = asked(team, view, slot)
         np.testing.assert_array_equal(transmits, np.diagonal(slots) == slot - FIRST)
         np.testing.assert_array_equal(team.table.sent == slot - FIRST, transmits)
 
@@ -180,15 +182,13 @@ def test_robots_that_believe_the_same_work_out_the_same_first_slots():
 def test_robots_in_need_contend_where_nobody_owns_the_slot():
     """Robots 200 m apart in a row hear their neighbours; all but robots 0 and 1 heard of both of
     theirs a slot ago. Of those in need, the draw picks some."""
-    buffers = row()
+    view = row()
     slot = FIRST + 15  # the first of no frame
-    assert place_of(15, begun(buffers)._rule) == NO_PLACE
+    assert place_of(15, begun(view)._rule) == NO_PLACE
     now = (slot + 1) / 2
-    buffers.timestamp[0] = np.where(np.abs(SILENCE[:, None] - SILENCE) <= 1, now - 0.5, 1.0)
+    view.timestamp[...] = np.where(np.abs(SILENCE[:, None] - SILENCE) <= 1, now - 0.5, 1.0)
     lost = now - math.ceil(3.0 * 11) / 2 - 1.0  # a bit more than three frames of 11 slots
-    buffers.timestamp[0, 0, 1] = buffers.timestamp[0, 1, 0] = lost
+    view.timestamp[0, 1] = view.timestamp[1, 0] = lost
     for draw, expected in ((0.39, [0, 1]), (0.41, [])):
-        transmits = begun(row()).transmits(
-            slot, SILENCE < 0, buffers, 0, SILENCE, np.full(NUM_ROBOTS, draw)
-        )
+        transmits = asked(begun(row()), view, slot, draw=np.full(NUM_ROBOTS, draw))
         assert np.flatnonzero(transmits).tolist() == expected
