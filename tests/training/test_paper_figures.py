@@ -1,7 +1,8 @@
-"""The experiment evaluates what is missing, once, and hands it over whole."""
+"""The experiment evaluates what is missing, once, and shows results when all are there."""
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import paper_figures as experiment
 import pytest
@@ -20,22 +21,21 @@ NAMES = [
 
 @pytest.fixture
 def calls(monkeypatch):
-    """The commands called; instead of flying, each writes itself as its result."""
-    seen = []
+    """The commands called; instead of flying, each writes its name as a result, or is broken."""
+    calls = SimpleNamespace(seen=[], broken=set(), commit="abc")
 
     def command(arguments):
-        seen.append(arguments)
+        calls.seen.append(arguments)
         path = Path(arguments[arguments.index("--csv") + 1])
-        if path.name in broken:
+        if path.name in calls.broken:
             return 130
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_csv(path, [replace(result("mst"), commit=made_by[0])])
+        write_csv(path, [replace(result("mst"), commit=calls.commit)])
         return 0
 
-    broken, made_by = set(), ["abc"]
     monkeypatch.setattr(experiment, "commit", lambda: "abc")
     monkeypatch.setattr(experiment, "swarm_mj", command)
-    return seen, broken, made_by
+    return calls
 
 
 @pytest.fixture
@@ -48,9 +48,8 @@ def files(folder):
 
 
 def test_the_commands_cover_every_published_regime(calls, settings):
-    seen, *_ = calls
     assert experiment.evaluate(settings, 3, force=False) == 0
-    studies = [parse(arguments)[1].study for arguments in seen]
+    studies = [parse(arguments)[1].study for arguments in calls.seen]
     assert all((study.episodes, study.seed) == (50, 2000) for study in studies)
     found = [
         (regime.preset, point)
@@ -61,56 +60,52 @@ def test_the_commands_cover_every_published_regime(calls, settings):
     wanted = [p for p in points() if p.policy == "mst" and p.figure != "fig3_receptive_field"]
     assert len(found) == 2 * len(wanted)
     assert set(found) == {(preset, point) for preset in settings.presets for point in wanted}
-    assert {arguments[arguments.index("--jobs") + 1] for arguments in seen} == {"3"}
+    assert {arguments[arguments.index("--jobs") + 1] for arguments in calls.seen} == {"3"}
 
 
 def test_what_is_there_is_kept(calls, settings):
-    seen, *_ = calls
     settings.results.mkdir()
     (settings.results / NAMES[0]).write_text("mine")
     assert experiment.evaluate(settings, 1, force=False) == 0
-    assert len(seen) == 5
-    assert all("--resume" in arguments and "--force" not in arguments for arguments in seen)
+    assert len(calls.seen) == 5
+    assert all("--resume" in arguments and "--force" not in arguments for arguments in calls.seen)
     assert (settings.results / NAMES[0]).read_text() == "mine"
     assert files(settings.results) == sorted(NAMES)
     assert experiment.evaluate(settings, 1, force=False) == 0
-    assert len(seen) == 5
+    assert len(calls.seen) == 5
 
 
-def test_an_interruption_hands_over_nothing_and_the_next_run_goes_on(calls, settings):
-    seen, broken, _ = calls
-    broken.add(NAMES[2])
+def test_an_interruption_leaves_no_results_and_the_next_run_resumes(calls, settings):
+    calls.broken.add(NAMES[2])
     assert experiment.evaluate(settings, 1, force=False) == 130
     assert files(settings.results) == []
     assert files(settings.drafts) == sorted(NAMES[:2])
-    broken.clear()
+    calls.broken.clear()
     assert experiment.evaluate(settings, 1, force=False) == 0
-    assert len(seen) == 3 + 4
+    assert len(calls.seen) == 3 + 4
     assert files(settings.results) == sorted(NAMES)
     assert files(settings.drafts) == []
 
 
-def test_force_makes_all_anew_and_if_interrupted_goes_on_without_it(calls, settings):
-    seen, broken, _ = calls
+def test_force_makes_everything_again_and_is_resumed_without_it(calls, settings):
     experiment.evaluate(settings, 1, force=False)
     experiment.evaluate(settings, 1, force=True)
-    assert len(seen) == 12
-    broken.add(NAMES[1])
+    assert len(calls.seen) == 12
+    calls.broken.add(NAMES[1])
     assert experiment.evaluate(settings, 1, force=True) == 130
     assert files(settings.results) == []
-    broken.clear()
+    calls.broken.clear()
     assert experiment.evaluate(settings, 1, force=False) == 0
-    assert len(seen) == 12 + 2 + 5
+    assert len(calls.seen) == 12 + 2 + 5
 
 
-def test_drafts_of_another_commit_are_made_anew(calls, settings):
-    seen, broken, made_by = calls
-    made_by[0] = "def"
-    broken.add(NAMES[2])
+def test_drafts_of_another_commit_are_made_again(calls, settings):
+    calls.commit = "def"
+    calls.broken.add(NAMES[2])
     experiment.evaluate(settings, 1, force=False)
-    broken.clear()
-    made_by[0] = "abc"
+    calls.broken.clear()
+    calls.commit = "abc"
     assert experiment.evaluate(settings, 1, force=False) == 0
-    assert len(seen) == 3 + 6
+    assert len(calls.seen) == 3 + 6
     commits = {read_results(settings.results / name)[0].commit for name in NAMES}
     assert commits == {"abc"}
