@@ -35,7 +35,7 @@ PLANNED = {  # missions by what is said of them
     "planner, 40 robots that hear 1 km far": replace(MISSION, range_ratio=1.0),
 }
 PLAIN_STEP = "one plain MuJoCo step of 40 robots"
-IN_STEPS = "  that is so many plain MuJoCo steps"
+IN_STEPS = "  in plain MuJoCo steps"
 
 
 class Row(NamedTuple):

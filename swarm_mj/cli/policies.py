@@ -28,7 +28,7 @@ HEADINGS = {False: "each robot decides by itself; it uses", True: "a centre deci
 LEGEND = """\
 broadcasts: robots may transmit in both halves of a window, to all who hear; nobody answers.
 request: a robot addresses a teammate in the first half, which answers in the second.
-T, M, P: all that the sender knows of its teammates: when it was seen, the state, who told it.
+T, M, P: all that the sender knows of its teammates: when it was seen, its state, who passed it on.
 snapshots: two pictures of the whole team, on which robots agree to plan alike.
 links: how often robots decoded and missed each other, and what that says of the channel.
 p: the probability of a transmission, unless you give --probability.
