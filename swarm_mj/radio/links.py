@@ -82,9 +82,10 @@ def links_between(
         distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
-        # The steeper the path loss, the more dB an error of the distance is worth.
-        is_steeper = distance_m > law.breakpoint_m
-        distance_over_std /= np.where(is_steeper, law.exponent / FREE_SPACE_EXPONENT, 1.0)
+        if law.breakpoint_m < np.inf:
+            # The steeper the path loss, the more dB an error of the distance is worth.
+            is_steeper = distance_m > law.breakpoint_m
+            distance_over_std /= np.where(is_steeper, law.exponent / FREE_SPACE_EXPONENT, 1.0)
     return Links(
         received_mw=received_mw,
         distance_over_std=distance_over_std,
