@@ -17,6 +17,7 @@ from rich.console import Console
 from rich.table import Column, Table
 
 from swarm_mj.radio import reception
+from swarm_mj.replay.view import has_display
 from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import free_memory, free_room, in_gb
@@ -133,13 +134,15 @@ def _of_trial(failed: Finding, program: str, variables: Mapping[str, str] | None
 
 
 def machine() -> Iterator[Finding]:
-    """Find cores, memory, disk, and a place for compiled code."""
+    """Find cores, memory, disk, a place for compiled code, and a display."""
     threads = os.environ.get("OMP_NUM_THREADS")
     set_to = f", OMP_NUM_THREADS={threads}" if threads else ""
-    yield Finding("machine", "cores", "ok", f"{num_cores()} may be used{set_to}")
-    yield Finding("machine", "memory free", "ok", in_gb(free_memory()))
-    yield Finding("machine", "disk free here", "ok", in_gb(free_room(Path.cwd())))
+    yield Finding("speed", "cores", "ok", f"{num_cores()} may be used{set_to}")
     yield _compiled_code()
+    yield Finding("room", "memory free", "ok", in_gb(free_memory()))
+    yield Finding("room", "disk free here", "ok", in_gb(free_room(Path.cwd())))
+    state, mend = ("ok", "") if has_display() else ("absent", "`swarm-mj replay --web` needs none")
+    yield Finding("rerun's viewer", "display", state, "there is one" if not mend else "none", mend)
 
 
 def _compiled_code() -> Finding:
@@ -149,11 +152,11 @@ def _compiled_code() -> Finding:
     try:
         if folder is not None:
             check_writable(Path(folder) / "kernels")
-            return Finding("machine", "compiled code", "ok", f"kept in {folder}")
+            return Finding("speed", "compiled code", "ok", f"kept in {folder}")
     except OSError as error:
         problem = f"{folder} cannot be written ({error})"
     mend = "set NUMBA_CACHE_DIR to a folder that you can write"
-    return Finding("machine", "compiled code", "absent", problem, mend)
+    return Finding("speed", "compiled code", "absent", problem, mend)
 
 
 def _print(found: list[Finding], *, works: bool) -> None:

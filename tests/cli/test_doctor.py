@@ -137,3 +137,15 @@ def test_what_came_of_trials(monkeypatch, works, said, flight, rendering):
 def test_long_complaints_are_cut_between_words(monkeypatch):
     monkeypatch.setattr(doctor, "attempt", lambda *_: (False, "a word " * 99))
     assert next(tried()).found == "a word " * 56 + "a ..."
+
+
+@pytest.mark.parametrize("name", ["DISPLAY", "WAYLAND_DISPLAY"])
+def test_a_display_is_one_of_two(monkeypatch, name):
+    monkeypatch.setattr("sys.platform", "linux")
+    for each in ("DISPLAY", "WAYLAND_DISPLAY"):
+        monkeypatch.delenv(each, raising=False)
+    without = {each.name: each for each in doctor.machine()}["display"]
+    assert without.state == "absent"
+    assert "--web" in without.mend
+    monkeypatch.setenv(name, ":1")
+    assert {each.name: each.state for each in doctor.machine()}["display"] == "ok"
