@@ -120,7 +120,7 @@ MAX_LINES, MAX_FILE_LINES, MAX_ROOMS = 21_800, 300, 20
 # A policy is in the package only if it is the paper's, a textbook baseline, or leads a committed
 # table at equal information by 10 % in two tasks (training/results/).
 PAPERS_POLICIES = {"random-flooding", "round-robin", "mst", "gnn"}
-BASELINE_POLICIES = {"aloha", "gossip", "tdma", "spatial-tdma", "sotdma", "greedy-oracle"}
+BASELINE_POLICIES = {"aloha", "csma", "gossip", "tdma", "spatial-tdma", "sotdma", "greedy-oracle"}
 LEADING_POLICIES = {"planner"}
 
 

@@ -31,6 +31,9 @@ AUTHORS_GRID = (0.04, 0.06, 0.08, 0.1, 0.12, 0.15)  # of flooding and MST, in th
 WIDE_GRID = (0.01, 0.02, 0.03, *AUTHORS_GRID, 0.2, 0.25, 0.3, 0.4)
 # Aloha's probability is a neighbourhood's, not a robot's.
 ALOHA_GRID = (0.1, 0.2, 0.25, 0.3, 0.35, 0.4, 0.5, 0.6, 0.7, 0.8, 0.9, 0.95, 0.98, 0.99)
+# Carrier sensing's is per minislot; the least is that of the longest backoff of IEEE 802.11, 1023
+# minislots, whose mean is that of 2 / 1024.
+CSMA_GRID = (0.002, 0.005, 0.01, 0.02, 0.03, 0.05, 0.07, 0.1, 0.15, 0.2, 0.3)
 # Gossip's is per window of news.
 GOSSIP_GRID = (
     0.004,
@@ -63,7 +66,7 @@ def grid_of(policy: str, preset: str) -> tuple[float, ...]:
     """Return the probabilities to try: under `reference` the authors' own, for their baselines."""
     if policy in ("random-flooding", "mst"):
         return AUTHORS_GRID if preset == "reference" else WIDE_GRID
-    return {"aloha": ALOHA_GRID, "gossip": GOSSIP_GRID}[policy]
+    return {"aloha": ALOHA_GRID, "csma": CSMA_GRID, "gossip": GOSSIP_GRID}[policy]
 
 
 def regimes(preset: str, num_windows: int) -> Iterator[Mission]:

@@ -11,7 +11,7 @@ from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.mission.specification import NOTHING
-from swarm_mj.policies.policy import CentralisedPolicy, Policy
+from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.simulation.rollout import Summary
 
@@ -36,7 +36,7 @@ def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[s
         "bytes_per_second": packet_bytes * numbers["packets_transmitted"] / flown_s,
         "velocity_variance_left": last / first if first > 0.0 else None,
         "payload": policy.payload,
-        "is_centralised": isinstance(policy, CentralisedPolicy),
+        "is_centralised": policy.is_centralised,
     }
 
 

@@ -12,7 +12,7 @@ from rich.table import Column, Table
 
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
-from swarm_mj.policies.policy import CentralisedPolicy, Policy
+from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, normalised
 from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
@@ -76,7 +76,7 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
     entries = [times(field, packet.num_entries) for field in packet.entry]
     return {
         "name": name,
-        "is_centralised": isinstance(policy, CentralisedPolicy),
+        "is_centralised": policy.is_centralised,
         "window": "broadcasts" if policy.window(mission).is_broadcast else "request",
         "uses": policy.uses,
         "payload": policy.payload,

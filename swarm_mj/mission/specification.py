@@ -108,6 +108,9 @@ class Mission:
     # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
     sinr_threshold_db: float = _number(1.0, "SINR threshold", "dB", -30.0, 60.0)
     noise_dbm: float = _number(-50.0, "noise power", "dBm", -200.0, 50.0)
+    sensing_dbm: float = _radio(
+        -57.0, "sensing threshold", "dBm", -200.0, 50.0, "from where on csma finds its channel busy"
+    )
     frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
     failure_fraction: float = _number(
         0.0, "failure fraction", "of the team", 0.0, 0.9, "robots that fail half-way", source=NEW

@@ -20,6 +20,7 @@ Parameters = Mapping[str, bool | int | float | str]  # what a policy was made wi
 class Policy:
     """A choice of the robot that every robot addresses next, and of the form of a window."""
 
+    is_centralised: bool = False  # whether a centre decides, or each robot by itself
     uses: str = ""  # the information that each robot decides by, or the centre, in a few words
 
     def window(self, mission: Mission) -> WindowProtocol:
@@ -128,6 +129,8 @@ def team_views(views: LocalViews) -> list[TeamView]:
 
 class CentralisedPolicy(Policy, ABC):
     """A policy that knows the truth: everyone's buffer and everyone's true state."""
+
+    is_centralised = True  # unless the truth stands in for what each robot senses
 
     def inform(self, truth: TrueLinks) -> None:
         """Receive, before `start`, the true links before their fades; ignored by default."""

@@ -11,6 +11,7 @@ from typing import Any
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, make
+from swarm_mj.policies.carrier_sense import CarrierSense
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.planner.link_tables import link_fields
@@ -36,8 +37,8 @@ def _planner(mission: Mission) -> Planner | RestingPlanner:
     return RestingPlanner(mission, learns=fits(packet_of(mission, link_fields(mission)), mission))
 
 
-# What makes each policy, given the mission and, for these four, a transmission probability.
-HAVE_PROBABILITY = ("random-flooding", "mst", "aloha", "gossip")
+# What makes each policy, given the mission and, for these, a transmission probability.
+HAVE_PROBABILITY = ("random-flooding", "mst", "aloha", "csma", "gossip")
 RULES: dict[str, Callable[..., Policy]] = {
     "random-flooding": lambda mission, probability: RandomFlooding(
         probability, names_addressee=mission.half_duplex == "eavesdroppers"
@@ -49,6 +50,7 @@ RULES: dict[str, Callable[..., Policy]] = {
         root_transmits=mission.tree_root_transmits,
     ),
     "aloha": lambda mission, probability: Aloha(probability, range_m=mission.range_m),
+    "csma": lambda mission, probability: CarrierSense(probability, mission.sensing_dbm),
     "gossip": lambda _, probability: InnovationGossip(probability),
     "tdma": lambda _: Tdma(),
     "spatial-tdma": SpatialTdma,

@@ -44,7 +44,7 @@ def test_json_says_of_every_policy_what_it_is(capsys):
     assert {name for name, each in listed.items() if each["window"] == "request"} == REQUEST
     assert {name for name, each in listed.items() if each["payload"] != "none"} == {"planner"}
     assert all(each["uses"] and each["description"] for each in listed.values())
-    for name in ("random-flooding", "mst", "aloha", "gossip"):
+    for name in ("random-flooding", "mst", "aloha", "csma", "gossip"):
         assert listed[name]["probability"] == tuned_probability(name, MISSION)
 
 

@@ -6,6 +6,7 @@ import pytest
 from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper, reference
+from swarm_mj.policies.carrier_sense import CarrierSense
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.learned import LearnedPolicy
@@ -28,7 +29,7 @@ from swarm_mj.system.packages import asset
 MISSION = paper("flocking", num_robots=8)
 REST = paper("stationary", num_robots=8)
 SCHEDULES = ["round-robin", "tdma", "spatial-tdma", "sotdma", "planner", "planner --payload none"]
-TUNED = ["random-flooding", "mst", "aloha", "gossip"]
+TUNED = ["random-flooding", "mst", "aloha", "csma", "gossip"]
 here = pytest.mark.usefixtures("folder")
 
 
@@ -119,6 +120,7 @@ KINDS = {
     "mst": MinimumSpanningTree,
     "round-robin": RoundRobin,
     "aloha": Aloha,
+    "csma": CarrierSense,
     "gossip": InnovationGossip,
     "tdma": Tdma,
     "spatial-tdma": SpatialTdma,

@@ -8,7 +8,7 @@ from swarm_mj.policies import tuning
 from swarm_mj.policies.tuning import TABLE, Tuned, read_table, tuned_probability
 
 AUTHORS_GRID = {0.04, 0.06, 0.08, 0.1, 0.12, 0.15}
-POLICIES = ("random-flooding", "mst", "aloha", "gossip")
+POLICIES = ("random-flooding", "mst", "aloha", "csma", "gossip")
 # The regimes of the paper's result figures (IV-B): task, robots, range, velocity.
 REGIMES = [
     *[("stationary", 40, ratio, 0.15) for ratio in (0.2, 0.25, 0.5, 0.75, 1.0)],

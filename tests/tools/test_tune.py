@@ -84,7 +84,7 @@ def test_iv_c_every_probability_has_its_grid_the_authors_where_numbers_are_publi
         assert tool.grid_of(policy, "reference") == tool.AUTHORS_GRID
         assert set(tool.AUTHORS_GRID) < set(tool.grid_of(policy, "paper"))
         assert min(tool.grid_of(policy, "paper")) == 0.01
-    for policy in ("aloha", "gossip"):
+    for policy in ("aloha", "csma", "gossip"):
         assert tool.grid_of(policy, "paper") == tool.grid_of(policy, "reference")
     parameters = {name: make_policy(name, paper()).parameters for name in POLICIES}
     assert list(tool.HAVE_PROBABILITY) == [n for n in POLICIES if "probability" in parameters[n]]
@@ -119,7 +119,7 @@ def test_one_policy_alone_keeps_the_rows_of_the_others(tool, run, tmp_path):
     tool.write_table(read_table(tool.TABLE), path)
     done = run("--policy", "gossip", *QUICK, "--seed", "8", "--out", path)
     assert done.returncode == 0, done.stderr
-    assert "28 of 112 probabilities tuned" in done.stderr
+    assert "28 of 140 probabilities tuned" in done.stderr
     with owned(path):
         done = run("--policy", "mst", *QUICK, "--out", path)
     assert done.returncode == 2
@@ -132,7 +132,7 @@ def test_one_policy_alone_keeps_the_rows_of_the_others(tool, run, tmp_path):
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        (["--policy", "tdma"], "one of random-flooding, mst, aloha, gossip, not 'tdma'"),
+        (["--policy", "tdma"], "one of random-flooding, mst, aloha, csma, gossip, not 'tdma'"),
         (["--episodes", "1"], "episodes must be a whole number from 2 to 10000, not 1"),
         (["--seed", "-1"], "seeds must be"),
         (["--windows", "0"], "number of windows must be"),

@@ -1,0 +1,122 @@
+"""Carrier sensing: who holds back for whom, hidden terminals, and how often two begin at once."""
+
+import math
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from swarm_mj.mission import paper
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.carrier_sense import CarrierSense, beginners
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.radio.mission_radio import TrueLinks, radio_of
+from swarm_mj.simulation.swarm import Swarm
+
+MISSION = paper("stationary")
+SENSED_MW = 10 ** (MISSION.sensing_dbm / 10)
+
+
+def begun(minislot, power_mw, sensed_mw=1.0, is_active=None):
+    """The robots that transmit, by name of their place in the list."""
+    minislot = np.asarray(minislot, dtype=float)
+    active = np.ones(len(minislot), dtype=bool) if is_active is None else np.array(is_active)
+    power_mw = np.asarray(power_mw, dtype=float)
+    return list(np.flatnonzero(beginners(minislot, active, power_mw, sensed_mw)))
+
+
+def in_line(num_robots, reach=1):
+    """Robots in a line that each sense those at most `reach` places away."""
+    place = np.arange(num_robots)
+    return (abs(place[:, None] - place) <= reach) * 2.0
+
+
+def test_a_robot_holds_back_for_those_it_senses_only():
+    assert begun([0, 1, 2], in_line(3)) == [0, 2]  # hidden terminals: 0 and 2 both reach 1
+    assert begun([1, 0, 2], in_line(3)) == [1]
+    assert begun([0, 1, 2, 3, 4], in_line(5, reach=2)) == [0, 3]
+
+
+def test_robots_of_one_minislot_do_not_sense_each_other():
+    assert begun([3, 3, 4], in_line(3)) == [0, 1]
+
+
+def test_a_robot_that_held_back_silences_nobody():
+    assert begun([0, 1, 2, 3], in_line(4)) == [0, 2]
+
+
+def test_a_robot_that_failed_neither_transmits_nor_is_sensed():
+    assert begun([0, 1, 2], in_line(3), is_active=[False, True, True]) == [1]
+
+
+def test_power_that_is_just_sensed_is_busy_and_powers_add_up():
+    power_mw = np.zeros((3, 3))
+    power_mw[0, 2] = power_mw[1, 2] = 0.5
+    assert begun([0, 1, 2], power_mw) == [0, 1]
+    assert begun([0, 1, 2], power_mw, sensed_mw=1.01) == [0, 1, 2]
+
+
+@given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(2, 12))
+def test_who_transmits_is_who_heard_too_little_before(seed, num_robots):
+    """The rule read backwards: a robot transmits if, and only if, those before it are too weak."""
+    rng = np.random.default_rng(seed)
+    minislot = rng.integers(0, 5, num_robots).astype(float)
+    power_mw = rng.exponential(1.0, (num_robots, num_robots))
+    found = begun(minislot, power_mw, 1.5)
+    for j in range(num_robots):
+        earlier_mw = sum(power_mw[i, j] for i in found if minislot[i] < minislot[j])
+        assert (j in found) == (earlier_mw < 1.5)
+
+
+def started(probability, num_robots, num_missions=1):
+    policy = CarrierSense(probability, MISSION.sensing_dbm)
+    policy.inform(TrueLinks(radio=radio_of(MISSION)))
+    policy.start(num_robots, [np.random.default_rng((3, b)) for b in range(num_missions)])
+    return policy
+
+
+def slots(probability, position_m, num_slots):
+    """Who transmits [slot, robot]."""
+    position_m = np.array([position_m], dtype=float)
+    num_robots = position_m.shape[1]
+    policy, buffers = started(probability, num_robots), empty_buffers(1, num_robots)
+    views = LocalViews(buffers=buffers, now=np.zeros(1), phases=())
+    states = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
+    return np.stack([policy.recipients(views, states)[0] == BROADCAST for _ in range(num_slots)])
+
+
+@pytest.mark.parametrize("probability", [0.1, 0.6])
+def test_two_neighbours_begin_together_as_geometric_draws_do(probability):
+    """The sum of p² (1 - p)^2k over minislots k is p / (2 - p); else one of them transmits."""
+    sent = slots(probability, [[0, 0], [100, 0]], 3000)
+    expected = probability / (2 - probability)
+    error = 5 * math.sqrt(expected * (1 - expected) / 3000)
+    assert np.mean(np.all(sent, axis=1)) == pytest.approx(expected, abs=error)
+    assert np.all(np.any(sent, axis=1))
+
+
+def test_robots_that_never_begin_or_always():
+    assert not np.any(slots(0.0, [[0, 0], [100, 0]], 20))
+    assert np.all(slots(1.0, [[0, 0], [100, 0]], 20))
+
+
+def test_the_default_threshold_is_sensed_at_two_and_a_half_times_the_range():
+    sensed_m = radio_of(MISSION).received_at_1_m_mw / SENSED_MW
+    assert math.sqrt(sensed_m) == pytest.approx(2.5 * MISSION.range_m, rel=0.01)
+    apart_m = 2.4 * MISSION.range_m
+    assert np.mean(np.all(slots(0.01, [[0, 0], [apart_m, 0]], 500), axis=1)) < 0.05
+    assert np.all(slots(0.01, [[0, 0], [apart_m * 1.1, 0]], 20))
+
+
+def test_most_packets_of_robots_that_sense_are_heard():
+    """Most broadcasts are heard by somebody, which is not so under slotted ALOHA."""
+    shares = {}
+    for name in ("csma", "aloha"):
+        swarm = Swarm(paper("stationary", num_windows=60), range(4))
+        policy = make_policy(name, swarm.mission, 0.02 if name == "csma" else 0.8)
+        packets = [swarm.step(policy).packets for _ in range(60)]
+        shares[name] = sum(p.heard.sum() for p in packets) / sum(p.sent.sum() for p in packets)
+    assert shares["csma"] > 0.8 > shares["aloha"]
