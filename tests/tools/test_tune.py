@@ -125,8 +125,8 @@ def test_one_policy_alone_keeps_the_rows_of_the_others(tool, run, tmp_path):
     assert done.returncode == 2
     assert "is being written by process" in done.stderr
     before, after = read_table(tool.TABLE), read_table(path)
-    assert after[:84] == before[:84]
-    assert {(row.policy, row.first_seed) for row in after[84:]} == {("gossip", 8)}
+    assert after[:112] == before[:112]
+    assert {(row.policy, row.first_seed) for row in after[112:]} == {("gossip", 8)}
 
 
 @pytest.mark.parametrize(
