@@ -38,9 +38,12 @@ FILE_PIXEL_BYTES = 0.05  # of each picture
 
 
 def quiet_environment() -> dict[str, str]:
-    """Return this environment, changed so that rerun's viewer reaches this machine only."""
+    """Return this environment, changed so that rerun's viewer reaches this machine only.
+
+    The viewer says what fails, unless RUST_LOG asks for more: its notes name other addresses.
+    """
     kept = {name: value for name, value in os.environ.items() if name.upper() not in REPLACED}
-    return kept | {"CI": "true", "ALL_PROXY": NOWHERE}
+    return {"RUST_LOG": "error"} | kept | {"CI": "true", "ALL_PROXY": NOWHERE}
 
 
 def has_display() -> bool:

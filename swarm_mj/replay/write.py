@@ -53,7 +53,8 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
     with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
         stream = recording.binary_stream()
         laid_out = layout(log, ground)
-        recording.send_blueprint(laid_out, make_active=False)
+        # Active, for rerun's page in a browser ignores one that is a default only.
+        recording.send_blueprint(laid_out, make_active=True)
         laid_out.close()
         recording.set_log_tick_enabled(False)
         recording.set_log_time_enabled(False)

@@ -1,14 +1,25 @@
 """Replays open where there is a display, else in a browser; a video lasts as long as meant."""
 
+import base64
+import io
+import json
 import os
+import shutil
 import subprocess
 import sys
+import tempfile
+import time
 import urllib.request
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 
+import numpy as np
 import pytest
+from PIL import Image
+from websockets.sync.client import connect
 
+from swarm_mj.replay import palette
 from swarm_mj.replay.view import (
     LOOPBACK,
     VIEWER,
@@ -21,8 +32,10 @@ from swarm_mj.replay.view import (
     video_needs,
     view_command,
 )
+from swarm_mj.system.processes import running
 
 FILE = Path("some where") / "mission.rrd"
+CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 def test_a_window_needs_a_display(monkeypatch):
@@ -66,22 +79,96 @@ def test_a_viewer_runs_nothing_of_the_folder_here(trapped):
     assert not trapped.exists()
 
 
-def test_the_page_is_served(replay):
+@pytest.fixture
+def served(replay):
+    """A replay's address, while it is served, and the file of what its server says."""
     command = [sys.executable, "-m", "swarm_mj", "replay", "--web", str(replay)]
-    server = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True)
-    try:
-        address = ""
-        for line in server.stdout:
-            address = address or (line.split()[1] if line.startswith("Open http") else "")
-            if "Hosting a web-viewer" in line:
-                break
-        with urllib.request.urlopen(address, timeout=30) as page:
-            assert page.status == 200
-            assert b"rerun" in page.read().lower()
-    finally:
-        server.terminate()
-        server.communicate(timeout=30)
+    with tempfile.TemporaryFile("w+") as said:
+        environment = {name: value for name, value in os.environ.items() if name != "RUST_LOG"}
+        server = subprocess.Popen(command, stdout=said, stderr=said, text=True, env=environment)
+        try:
+            yield until(lambda: page_of(said)), said
+        finally:
+            server.terminate()
+            server.communicate(timeout=30)
     assert server.returncode == 0
+
+
+def until(found, limit_s=60.0):
+    """What a function finds, asked until it finds something."""
+    deadline = time.monotonic() + limit_s
+    while time.monotonic() < deadline:
+        if answer := found():
+            return answer
+        time.sleep(0.2)
+    raise AssertionError(f"nothing within {limit_s:g} s")
+
+
+def page_of(said):
+    """The page's address, once it is named and answers."""
+    said.seek(0)
+    for line in said.read().splitlines():
+        if line.startswith("Open http"):
+            address = line.split()[1]
+            with suppress(OSError), urllib.request.urlopen(address, timeout=30) as page:
+                return address if b"rerun" in page.read().lower() else None
+    return None
+
+
+def test_the_page_is_served_and_no_address_but_its_own_is_shown(served):
+    address, said = served
+    said.seek(0)
+    assert said.read() == f"Open {address}\nCtrl-C ends it.\n"
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="it needs Chromium")
+def test_a_browser_opens_with_our_layout(served, tmp_path):
+    """Our plots have a ground of their own, which no view of rerun's automatic grid has."""
+    with browser(served[0], tmp_path) as screenshot:
+        until(lambda: share_of(palette.PLOT, screenshot()) > 0.1, limit_s=120.0)
+
+
+def share_of(colour, picture):
+    """The share of pixels of a colour, within what encoders change."""
+    return np.mean(np.all(np.abs(picture - np.array(colour)) <= 2, axis=2))
+
+
+@contextmanager
+def browser(address, profile):
+    """A headless Chromium that shows a page; it yields a function that takes its picture."""
+    options = (
+        *("--headless=new", "--no-sandbox", "--no-first-run", "--window-size=1600,1000"),
+        *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
+        *("--remote-debugging-port=0", f"--user-data-dir={profile}"),
+        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
+    )
+    with (
+        (profile / "said.txt").open("w") as said,
+        running([CHROMIUM, *options, address], output=said),
+    ):
+        port = until(lambda: "".join(port_lines(profile)[:1]))
+        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as pages:
+            (page,) = [one for one in json.load(pages) if one["type"] == "page"]
+        with connect(page["webSocketDebuggerUrl"], max_size=None, proxy=None) as socket:
+
+            def screenshot():
+                socket.send(json.dumps({"id": 1, "method": "Page.captureScreenshot"}))
+                png = base64.b64decode(json.loads(socket.recv())["result"]["data"])
+                return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
+
+            yield screenshot
+
+
+def port_lines(profile):
+    """The port that Chromium listens on, and more, once it does."""
+    file = profile / "DevToolsActivePort"
+    return file.read_text().splitlines() if file.exists() else []
+
+
+def test_what_fails_is_said(tmp_path, capfd):
+    assert run([*VIEWER, "--serve-web", str(tmp_path / "missing.rrd")]) == 1
+    assert "missing.rrd" in capfd.readouterr().err
 
 
 @pytest.mark.parametrize(
