@@ -1,22 +1,35 @@
 """Charts of flights and evaluations: one mission over time, and policies below each other."""
 
+import textwrap
 from collections.abc import Mapping, Sequence
+from itertools import groupby
 
 import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.figure import Figure
+from matplotlib.figure import Figure, SubFigure
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, escape_mathtext, look_of, styled
-from swarm_mj.evaluation.results import Result
-from swarm_mj.mission.components import components_in
+from swarm_mj.evaluation.figures.style import (
+    CAPTION,
+    FAINT,
+    WIDTH_IN,
+    escape_mathtext,
+    look_of,
+    styled,
+)
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
+from swarm_mj.evaluation.table import missions_of
 
 Course = Float[np.ndarray, "T"]
 
 PANEL_IN, ROW_IN, HEAD_IN = 2.1, 0.32, 1.1
 TITLE_PT = 10.0
+LINE_IN, CHARACTERS = 0.16, 92  # of a title
+FOOT_IN = 0.2
+UNHEARD = "#eef0f4"  # behind the windows before everyone has heard of everyone
+SHORT = 7  # of a commit's digits
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
 
@@ -58,24 +71,57 @@ def draw_flight(
 
 
 def draw_evaluation(results: Sequence[Result]) -> Figure:
-    """Return a chart of policies, the lowest age first; of flocks, with velocity variances."""
-    shown = sorted(results, key=lambda result: result.aoi_mean)
-    first = shown[0]
-    costs = ["aoi", "velocity_variance"] if first.task == "flocking" else ["aoi"]
-    about = f"{first.task}, {first.num_robots} robots, {first.episodes} missions from seed "
-    title = f"{about}{first.seed}{components_in(vars(first)).title}"
+    """Return a chart of policies, the lowest age first; of flocks, with velocity variances.
+
+    Results of different missions stand below each other, and each group says its missions.
+    """
+    groups = {said: list(its) for said, its in groupby(results, missions_of)}
+    titles = [_lines(said) for said in groups]
+    heights_in = [
+        HEAD_IN + LINE_IN * (len(title) - 1) + ROW_IN * len(shown)
+        for title, shown in zip(titles, groups.values(), strict=True)
+    ]
     with styled():
-        height_in = HEAD_IN + ROW_IN * len(shown)
-        figure, axes = _axes(title, columns=len(costs), height_in=height_in)
-        for each, cost in zip(axes, costs, strict=True):
-            for place, result in enumerate(shown):
-                _draw_mean(each, place, result, cost)
-            each.set_xlabel(LABELS[cost].replace("\n", " "))
-            each.grid(visible=False, axis="y")
-            each.set_xlim(left=0.0)
-        axes[0].set_yticks(range(len(shown)), [look_of(r.policy).label for r in shown])
-        axes[0].set_ylim(len(shown) - 0.5, -0.5)
+        figure = plt.figure(figsize=(WIDTH_IN, sum(heights_in) + FOOT_IN), layout="constrained")
+        parts = figure.subfigures(len(groups), 1, height_ratios=heights_in, squeeze=False)
+        for part, title, shown in zip(parts.flat, titles, groups.values(), strict=True):
+            said = escape_mathtext("\n".join(title))
+            part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
+            _draw_policies(part, sorted(shown, key=lambda result: result.aoi_mean))
+        figure.supxlabel(_origin(results), x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
     return _kept(figure)
+
+
+def _lines(said: str) -> list[str]:
+    return textwrap.wrap(" ".join(said.split()), CHARACTERS, break_on_hyphens=False)
+
+
+def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:
+    costs = ["aoi", "velocity_variance"] if shown[0].task == "flocking" else ["aoi"]
+    axes = list(part.subplots(1, len(costs), sharey="row", squeeze=False).flat)
+    for each, cost in zip(axes, costs, strict=True):
+        for place, result in enumerate(shown):
+            _draw_mean(each, place, result, cost)
+        each.set_xlabel(LABELS[cost].replace("\n", " "))
+        each.grid(visible=False, axis="y")
+        each.set_xlim(left=0.0)
+    names = [look_of(each.policy).label + " +" * carries_more(each) for each in shown]
+    axes[0].set_yticks(range(len(shown)), names)
+    axes[0].set_ylim(len(shown) - 0.5, -0.5)
+
+
+def _origin(results: Sequence[Result]) -> str:
+    """Return what is drawn, and what code it is from."""
+    first = results[0]
+    said = "mean over missions"
+    if first.aoi_ci_low is not None:
+        said += ", and its 95 % interval"
+    if any(map(carries_more, results)):
+        said += f"; +: packets {CARRIES_MORE}"
+    code = f"swarm_mj {first.version}" + (
+        f", commit {first.commit[:SHORT]}" if first.commit else ""
+    )
+    return escape_mathtext(f"{said}; {code}")
 
 
 def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
@@ -84,7 +130,12 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     axes.plot(columns["window"], columns["aoi"], color=colour, label="mean over all pairs")
     axes.set_ylabel(LABELS["aoi"])
     axes.set_ylim(bottom=0.0)
-    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+    done = np.flatnonzero(columns["is_complete"])
+    end = columns["window"][done[0] if len(done) else -1]
+    if end > columns["window"][0]:
+        label = "not everyone has heard of everyone yet"
+        axes.axvspan(columns["window"][0], end, color=UNHEARD, linewidth=0.0, label=label, zorder=0)
+    axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
 
 
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
@@ -96,12 +147,10 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
     axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.size + 2.0)
 
 
-def _axes(
-    title: str, *, rows: int = 1, columns: int = 1, height_in: float
-) -> tuple[Figure, list[Axes]]:
-    """Return a titled figure of panels, those of a column over one x, those of a row over one y."""
+def _axes(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes]]:
+    """Return a titled figure of panels below each other, over one x."""
     figure = plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
-    axes = figure.subplots(rows, columns, sharex="col", sharey="row", squeeze=False)
+    axes = figure.subplots(rows, 1, sharex="col", squeeze=False)
     figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
     return figure, list(axes.flat)
 

@@ -1,5 +1,6 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
+import shlex
 from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
@@ -14,7 +15,7 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.results import write_csv
+from swarm_mj.evaluation.results import Result, write_csv
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import summarise, write_evaluated
 from swarm_mj.evaluation.table import print_results
@@ -25,7 +26,7 @@ from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import tell_cores
+from swarm_mj.system.terminal import plain_console, quiet_matplotlib, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, owned
 
 
@@ -50,6 +51,9 @@ class EvaluateOptions(PolicyOptions):
     )
     csv: Path | None = output_option(
         None, "write all figures, one row a result", metavar="FILE.csv"
+    )
+    plot: Path | None = output_option(
+        None, "draw the policies' ages, the lowest first", metavar="FILE.png|.svg|.pdf"
     )
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)
@@ -76,8 +80,11 @@ def run(options: EvaluateOptions) -> int:
     need("scipy", "an evaluation")
     study = options.study
     outputs = Output("--json", options.json, ".json"), Output("--csv", options.csv, ".csv")
+    chart = Output("--plot", options.plot, ".png|.svg|.pdf")
+    if options.plot:
+        need("matplotlib", "a chart")
     inputs = stored_policies(options.policy)
-    check_outputs(*outputs, inputs=inputs, must_be_new=not options.force)
+    check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
     needs = study_needs(study, options.jobs)
     check_fits(needs, options.json or options.csv, way_out, is_forced=options.yes)
@@ -118,7 +125,18 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
         if kept:
             kept.unlink()
     print_results(results)
+    if options.plot:
+        _plot(options.plot, results)
     return DONE
+
+
+def _plot(path: Path, results: list[Result]) -> None:
+    quiet_matplotlib()
+    from swarm_mj.api.charts import draw_evaluation  # matplotlib is slow to import
+    from swarm_mj.evaluation.figures.style import save
+
+    save(draw_evaluation(results), path)
+    plain_console().print(f"Wrote {shlex.quote(str(path))}")
 
 
 def _progress_file(options: EvaluateOptions, outputs: Iterable[Output]) -> Path | None:

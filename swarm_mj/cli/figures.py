@@ -1,6 +1,5 @@
 """`swarm-mj figures`: draws the paper's figures from result files."""
 
-import logging
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -13,7 +12,7 @@ from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import LIBRARIES, YES, Needs, check_fits
-from swarm_mj.system.terminal import plain_console
+from swarm_mj.system.terminal import plain_console, quiet_matplotlib
 from swarm_mj.system.writing import Output, check_outputs
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
@@ -50,9 +49,8 @@ def run(options: FiguresOptions) -> int:
     results = [result for path in options.results for result in _papers(path)]
     console = plain_console()
     with Console(stderr=True).status("Drawing ...") as status:
-        # matplotlib is slow to import; it would warn of a cache that it cannot write.
-        logging.getLogger("matplotlib").setLevel(logging.ERROR)
-        from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of
+        quiet_matplotlib()
+        from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of  # slow to import
         from swarm_mj.evaluation.figures.drawing import draw
         from swarm_mj.evaluation.figures.flock import draw_flock
         from swarm_mj.evaluation.figures.style import save
@@ -100,7 +98,7 @@ def _papers(path: Path) -> list[Result]:
                 raise ValueError(
                     f"figures compare with the paper's values, but row {row} of {path} was flown "
                     f"with the {kind} {name}; leave such rows out, or chart them with "
-                    f"`swarm_mj.evaluate(...).plot()` in Python"
+                    f"`swarm-mj evaluate --plot FILE`"
                 )
     return results
 

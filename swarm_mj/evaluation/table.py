@@ -41,7 +41,7 @@ def print_results(results: Sequence[Result], file: io.StringIO | None = None) ->
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
     wide = open_console(width=width)
-    for regime, group in groupby(results, _regime):
+    for regime, group in groupby(results, missions_of):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
         wide.print(_table(of_regime))
@@ -51,7 +51,8 @@ def print_results(results: Sequence[Result], file: io.StringIO | None = None) ->
     console.print(" ".join(_legend(results)))
 
 
-def _regime(result: Result) -> str:
+def missions_of(result: Result) -> str:
+    """Return the missions that a result is of, in lines: results of others are not compared."""
     parts: dict[str, object] = {
         "radio": result.radio,
         "channel": result.channel,
@@ -64,10 +65,12 @@ def _regime(result: Result) -> str:
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
     failing = result.failure_fraction
     fate = f", {failing:.0%} of the robots off half-way" if failing else ""
+    flown = f"{result.episodes} mission{'s' * (result.episodes != 1)} from seed {result.seed}"
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
         f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g},\nboundary "
-        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}{own}"
+        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}, "
+        f"{flown}{own}"
     )
 
 

@@ -22,6 +22,9 @@ def test_a_flight_is_drawn_window_by_window():
     run = swarm_mj.fly("flocking", policy="tdma", **SHORT)
     age, variance = run.plot().axes
     worst, mean = age.lines
+    (unheard,) = age.patches
+    assert unheard.get_x() == 1.0
+    assert unheard.get_x() + unheard.get_width() == run.summary.complete_window > 1
     assert list(mean.get_ydata()) == list(run.to_dataframe().aoi)
     assert list(worst.get_ydata()) == list(run.log.age_max)
     assert list(variance.lines[0].get_xdata()) == list(range(1, 21))
@@ -41,6 +44,16 @@ def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(mo
     assert len(plt.get_fignums()) == 1
 
 
+def test_a_flight_is_shaded_until_everyone_has_heard_of_everyone():
+    never = swarm_mj.fly("stationary", policy="tdma", num_robots=6, num_windows=2)
+    assert never.summary.complete_window is None
+    (unheard,) = never.plot().axes[0].patches
+    assert unheard.get_x() + unheard.get_width() == 2
+    known = swarm_mj.fly("stationary", policy="tdma", num_windows=9, num_robots=2, range_ratio=3.0)
+    assert known.summary.complete_window == 1
+    assert list(known.plot().axes[0].patches) == []
+
+
 def test_a_task_with_a_cost_of_its_own_shows_that():
     run = swarm_mj.fly("random-walk", controller="added_tasks:Formation", policy="tdma", **SHORT)
     assert run.task_cost == ("formation error", "m")
@@ -58,9 +71,20 @@ def test_policies_stand_below_each_other_the_lowest_age_first():
     assert [label.get_text() for label in axes.get_yticklabels()] == labels
     assert [line.get_xdata()[0] for line in axes.lines] == [each.aoi_mean for each in by_age]
     assert len(axes.collections) == 2  # intervals
-    flown = replace(by_age[0], channel="my$:Radio", scene="my:walls")
-    title = charts.draw_evaluation([flown]).get_suptitle()
-    assert title.endswith(r"from seed 1000, channel my\$:Radio, scene my:walls")
+
+
+def test_a_chart_says_the_whole_mission_and_of_two_each_its_own():
+    (found,) = swarm_mj.evaluate("tdma", "random-walk", num_missions=2, **SHORT).results
+    own = replace(found.result, channel="my$:Radio", scene="my:walls", arena="rooms", payload="x")
+    figure = charts.draw_evaluation([found.result, own])
+    plain, other = (part.get_suptitle() for part in figure.subfigs)
+    for said in (plain, other):
+        assert "6 robots, range ratio 0.25" in said
+        assert "20 windows of exact physics, 2 missions from seed 1000" in said.replace("\n", " ")
+    assert other.replace("\n", " ").endswith(r", channel my\$:Radio, scene my:walls, arena rooms")
+    labels = [axes.get_yticklabels()[0].get_text() for axes in figure.axes]
+    assert labels == ["TDMA", "TDMA +"]
+    assert "95 % interval; +: packets carry more than T, M, P; " in figure.get_supxlabel()
 
 
 def test_one_mission_has_no_interval_and_flocks_have_velocities():

@@ -172,6 +172,19 @@ def test_robots_that_fail_are_another_regime_in_results_and_progress(
     assert results[0].aoi_mean != results[1].aoi_mean
 
 
+def test_a_chart_is_drawn_by_its_ending_beside_the_table(succeed, refusal, tmp_path):
+    two = (*SMALL, "--policy", "mst", "round-robin", "--episodes", "2", "--task", "random-walk")
+    done = succeed("evaluate", *two, "--fading", "rayleigh", "--plot", "a.svg")
+    assert done.stdout.endswith("Wrote a.svg\n")
+    assert "round-robin" in done.stdout
+    drawn = (tmp_path / "a.svg").read_text()
+    for said in ("random-walk, preset paper: 5 robots", "fading rayleigh", "round robin"):
+        assert f"<!-- {said}" in drawn or said in drawn
+    assert "a.svg exists" in refusal("evaluate", *two, "--plot", "a.svg")
+    succeed("evaluate", *two, "--plot", "a.PNG")
+    assert (tmp_path / "a.PNG").read_bytes().startswith(b"\x89PNG")
+
+
 @pytest.mark.parametrize("output", ["json", "csv"])
 def test_existing_results_need_force(succeed, refusal, tmp_path, output):
     """One mission of one window has results, too."""
@@ -193,6 +206,7 @@ REFUSED = {
     "--robots 10 1": "a whole number from 2 to 1000 [robots], not 1",
     "--range-ratio 0.02 --jobs 2": "too sparse",
     "--resume": "--resume needs the --json or --csv",
+    "--plot chart.jpg": "--plot must be named *.png or *.svg or *.pdf, not chart.jpg",
     "--csv r.json --json ./r.json": "same file",
     "--json o.json --csv o.json.progress": "--csv must be named *.csv, not o.json",
 }

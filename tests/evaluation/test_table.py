@@ -136,7 +136,7 @@ def test_the_lower_bound_stands_below(printed):
 @pytest.mark.parametrize(
     ("other", "said"),
     [
-        ({"failure_fraction": 0.2}, "1 windows of paper physics, 20% of the robots off half-way\n"),
+        ({"failure_fraction": 0.2}, "1 windows of paper physics, 20% of the robots off half-way, "),
         ({"bit_rate": 250e3}, ",\nbit rate 250 kbit/s\n"),
         ({"bit_rate": 1e6}, ",\nbit rate 1 Mbit/s\n"),
         ({"arena": "blocks"}, ",\narena blocks\n"),
@@ -150,6 +150,14 @@ def test_other_regimes_are_tables_of_their_own_and_say_so(printed, other, said):
     text = "\n".join(printed([some_result("a", 1.0, **plain | each) for each in ({}, other)], 100))
     assert text.count("preset paper: 1 robots") == 2
     assert text.count(said) == 1
+
+
+def test_the_title_says_which_missions(printed):
+    own = NOTHING | {"seed": 7}
+    two = [some_result("a", 1.0, **own, episodes=number) for number in (1, 12)]
+    text = " ".join(" ".join(printed(two, 100)).split())
+    assert "half-way, 1 mission from seed 7" in text
+    assert "half-way, 12 missions from seed 7" in text
 
 
 def test_a_tasks_own_cost_has_a_column_and_a_sentence(printed):

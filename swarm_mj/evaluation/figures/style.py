@@ -91,7 +91,7 @@ def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
 
 def save(figure: Figure, path: Path) -> None:
     """Write a figure, always the same bytes, with its caption as metadata; raise OSError if not."""
-    kind = path.suffix.removeprefix(".")
+    kind = path.suffix.removeprefix(".").lower()
     field, undated = METADATA[kind]
     [caption] = figure.findobj(lambda artist: artist.get_gid() == CAPTION)
     drawn = io.BytesIO()
