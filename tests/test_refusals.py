@@ -136,8 +136,8 @@ def test_fast_robots_leave_the_area_by_no_more_than_their_radius(velocity_ratio,
 
 # Arguments of another kind, which the checks of types in these tests would refuse in their words.
 OF_ANOTHER_KIND = {
-    "Mission(num_robot=3)": "Mission has no 'num_robot'; did you mean num_robots?",
-    "paper(robots=3)": "Mission has no 'robots'; ",
+    "Mission(num_robot=3)": "unexpected keyword argument 'num_robot'; did you mean num_robots?",
+    "paper(robots=3)": "Mission got an unexpected keyword argument 'robots'; ",
     "reference('flok')": "'flok'; did you mean flocking?",
     "paper(num_robots='20')": "number of robots must be a whole number from 2 to 1000 [robots], "
     "not '20'",

@@ -3,12 +3,14 @@
 The vector environment and PettingZoo's draw on the same screen.
 """
 
+import copy
 import time
 from collections.abc import Sequence
 from typing import Any
 
 import gymnasium
 import numpy as np
+from gymnasium.envs.registration import EnvSpec
 from gymnasium.utils import EzPickle
 from jaxtyping import Bool, UInt8
 
@@ -16,11 +18,16 @@ from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or
 from swarm_mj.envs.options import check_reset, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import moment
-from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
+from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer, has_display
 
 MODES = ("rgb_array", "human")
 RENDERING: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 10}  # 100 ms a window
 WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
+
+
+def modes_here() -> list[str]:
+    """Return the render modes that can work on this machine, so that checkers try no others."""
+    return [mode for mode in MODES if mode != "human" or has_display()]
 
 
 class Screen:
@@ -73,6 +80,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     """
 
     metadata = RENDERING
+    _spec: EnvSpec | None = None
 
     def __init__(
         self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
@@ -81,7 +89,19 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_team_batch(mission, **options)
         self._screen, self.render_mode = Screen(render_mode), render_mode
+        self.metadata = {**RENDERING, "render_modes": modes_here()}
         self.observation_space, self.action_space = team_spaces(self.batch)
+
+    @property
+    def spec(self) -> EnvSpec | None:
+        """Where `gymnasium.make` found this, with `max_episode_steps`; it adds no time limit."""
+        return self._spec
+
+    @spec.setter
+    def spec(self, spec: EnvSpec | None) -> None:  # pyright: ignore[reportIncompatibleVariableOverride]
+        self._spec = copy.copy(spec)
+        if self._spec is not None:
+            self._spec.max_episode_steps = self.batch.mission.num_windows
 
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None

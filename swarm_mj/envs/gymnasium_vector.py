@@ -43,6 +43,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         EzPickle.__init__(self, num_envs, mission, **modes, **options)
         check_count("num_envs", num_envs)
         self.num_envs, self._mode = num_envs, _mode_of(autoreset_mode)
+        self.autoreset_mode = self._mode  # where TorchRL looks for it
         self.metadata = {**self.metadata, "autoreset_mode": self._mode}
         self._screen = Screen(render_mode, self.metadata["render_modes"])
         self.render_mode = render_mode

@@ -158,7 +158,7 @@ def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[A
     teammate's news came over first, or -1.
     """
     num_robots = batch.mission.num_robots
-    most = np.inf if is_own_set(batch.features) else _largest_feature(batch.mission)
+    most = np.inf if is_own_set(batch.features) else largest_feature(batch.mission)
     seen: dict[str, spaces.Space] = {
         "action_mask": spaces.Box(0, 1, (num_robots,), np.int8),
         "observation": spaces.Box(-most, most, (num_robots, batch.num_features), np.float32),
@@ -175,7 +175,7 @@ def team_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[An
     return batch_space(seen, num_robots), spaces.MultiDiscrete([num_robots] * num_robots)
 
 
-def _largest_feature(mission: Mission) -> float:
+def largest_feature(mission: Mission) -> float:
     """Return a bound on every number that a feature set makes of a mission.
 
     Ages are shares of the mission or of `REFERENCE_WINDOWS`; positions and distances are those of

@@ -5,11 +5,12 @@ from typing import Any
 import numpy as np
 from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
-from jaxtyping import UInt8
+from jaxtyping import Float32, UInt8
 
-from swarm_mj.envs.gymnasium import RENDERING, Screen
+from swarm_mj.envs.gymnasium import RENDERING, Screen, modes_here
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import make_batch, robot_spaces
+from swarm_mj.envs.truth import truth, truth_space
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.checks import check_robots
 
@@ -40,20 +41,25 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
         self._screen, self.render_mode = Screen(render_mode), render_mode
+        self.metadata = {**METADATA, "render_modes": modes_here()}
         self.possible_agents = [f"robot_{i}" for i in range(self.batch.mission.num_robots)]
         self.agents: list[str] = []
         self._robot = {agent: i for i, agent in enumerate(self.possible_agents)}
         # One object for each agent: PettingZoo seeds them one by one.
-        self._spaces = {agent: robot_spaces(self.batch) for agent in self.possible_agents}
+        self.observation_spaces: dict[str, Space[Any]] = {}
+        self.action_spaces: dict[str, Space[Any]] = {}
+        for agent in self.possible_agents:
+            self.observation_spaces[agent], self.action_spaces[agent] = robot_spaces(self.batch)
+        self.state_space = truth_space(self.batch.mission)
         self._rng, _ = seeding.np_random()
 
     def observation_space(self, agent: str) -> Space[Any]:
         """Return an agent's view; see `robot_spaces`."""
-        return self._spaces[agent][0]
+        return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Space[Any]:
         """Return an agent's recipients; its own number is silence."""
-        return self._spaces[agent][1]
+        return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
@@ -97,6 +103,10 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         cut = dict.fromkeys(self.agents, is_over)
         self.agents = [] if is_over else [agent for agent in self.agents if not ended[agent]]
         return seen, rewards, ended, cut, infos
+
+    def state(self) -> Float32[np.ndarray, "S"]:
+        """Return the truth, for a centralised critic; no robot observes it; see `truth`."""
+        return truth(self.batch)[0]
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
         """Draw the mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""

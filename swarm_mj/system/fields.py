@@ -105,12 +105,15 @@ def did_you_mean(typed: object, known: Iterable[str]) -> str:
 
 
 def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Pass if all keywords given are known; raise TypeError, as Python does, if one is not."""
+    """Pass if all keywords given are known; raise TypeError in Python's words if one is not.
+
+    TorchRL, for one, reads these words: it tries options that an environment may not have.
+    """
     known = list(known)
     for name in given:
         if name not in known:
             hint = did_you_mean(name, known) or f"; it has {', '.join(known)}"
-            raise TypeError(f"{what} has no {name!r}{hint}")
+            raise TypeError(f"{what} got an unexpected keyword argument {name!r}{hint}")
 
 
 def check_kind(

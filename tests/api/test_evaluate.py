@@ -74,7 +74,11 @@ def test_it_shows_itself_as_the_table(found, monkeypatch):
     ("policy", "keywords", "complaint"),
     [
         ("tdmaa", {}, "did you mean tdma?"),
-        ("tdma", {"num_mission": 3}, "evaluate has no 'num_mission'; did you mean num_missions?"),
+        (
+            "tdma",
+            {"num_mission": 3},
+            "evaluate got an unexpected keyword argument 'num_mission'; did you mean num_missions?",
+        ),
         ("tdma", {"num_missions": 0}, "num_missions must be a whole number from 1 to 100000, not"),
         ("gnn", {"features": "mine:Feat"}, "on the features mine:Feat; leave them out"),
         ("tdma", {"num_jobs": 0}, "num_jobs must be a whole number from 1 to 256, not 0"),

@@ -114,7 +114,10 @@ def test_compiling_is_not_timed(monkeypatch):
 @pytest.mark.parametrize(
     ("keywords", "complaint"),
     [
-        ({"num_robot": 20}, "swarm_mj.fly has no 'num_robot'; did you mean num_robots?"),
+        (
+            {"num_robot": 20},
+            "swarm_mj.fly got an unexpected keyword argument 'num_robot'; did you mean num_robots?",
+        ),
         ({"policy": "tdmaa"}, "not 'tdmaa'; did you mean tdma?"),
         ({"features": "mine:Feat"}, "was trained on the features mine:Feat; leave them out"),
         ({"seed": -1}, "seeds must be one or more integers from 0"),

@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
+from gymnasium.wrappers import TimeAwareObservation
 
 from swarm_mj.envs import register_environments
 from swarm_mj.envs.gymnasium import HEIGHT, WIDTH, Screen, SwarmEnv
@@ -31,13 +32,67 @@ SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
     ],
 )
 @pytest.mark.usefixtures("opengl")
-def test_gymnasiums_own_check(name, options):
+def test_gymnasiums_own_check(name, options, monkeypatch):
+    for display in ("DISPLAY", "WAYLAND_DISPLAY"):  # where the check would open a window
+        monkeypatch.delenv(display, raising=False)
     register_environments()
     env = gymnasium.make(f"swarm_mj/{name}-v0", **SMALL, **options)
-    env.unwrapped.metadata = {**env.metadata, "render_modes": ["rgb_array"]}  # no window opens here
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         check_env(env.unwrapped)
+
+
+def test_render_modes_are_those_that_work_here(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    for modes, display in ((["rgb_array"], ""), (["rgb_array", "human"], ":0")):
+        monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+        monkeypatch.setenv("DISPLAY", display)
+        for env in (SwarmEnv(**SMALL), parallel_env(**SMALL)):
+            assert env.metadata["render_modes"] == modes
+
+
+def test_its_specification_says_when_a_mission_is_cut_off():
+    register_environments()
+    env = gymnasium.make("swarm_mj/Flocking-v0", **SMALL)
+    assert env.spec.max_episode_steps == 8
+    timed = TimeAwareObservation(env, flatten=False, normalize_time=True)
+    timed.reset(seed=1)
+    for window in range(8):
+        seen, _, _, truncated, _ = timed.step(np.arange(5))
+        assert seen["time"] == np.float32((window + 1) / 8)
+        assert truncated == (window == 7)
+    again = gymnasium.make(env.spec)
+    assert again.spec.kwargs == env.spec.kwargs
+    assert gymnasium.spec("swarm_mj/Flocking-v0").max_episode_steps is None  # of another length
+
+
+START_ELSEWHERE = """
+import gymnasium
+def make():
+    return gymnasium.make("swarm_mj:swarm_mj/Flocking-v0", num_robots=3, num_windows=2)
+if __name__ == "__main__":
+    envs = gymnasium.vector.AsyncVectorEnv([make, make], context={context!r})
+    _, infos = envs.reset(seed=4)
+    print(infos["seed"].tolist(), envs.step(envs.action_space.sample())[1].shape)
+    envs.close()
+"""
+
+
+@pytest.mark.parametrize("context", ["spawn", "forkserver"])
+def test_processes_that_start_anew_import_it_by_its_name(context, tmp_path):
+    """No file but this one names the package; the processes have not imported it."""
+    script = tmp_path / "elsewhere.py"
+    script.write_text(START_ELSEWHERE.format(context=context))
+    command = [sys.executable, "-W", "ignore", str(script)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.stdout == "[4, 5] (2,)\n", done.stderr
+
+
+def test_unknown_options_are_refused_in_pythons_words():
+    """TorchRL's `GymEnv` tries `frameskip`, and goes on without it if it reads these words."""
+    register_environments()
+    with pytest.raises(TypeError, match="unexpected keyword argument 'frameskip'"):
+        gymnasium.make("swarm_mj/Flocking-v0", frameskip=1)
 
 
 def test_info_is_what_the_window_cost():

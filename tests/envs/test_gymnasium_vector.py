@@ -96,6 +96,7 @@ def test_made_by_name():
     )
     assert isinstance(env, SwarmVectorEnv)
     assert env.metadata["autoreset_mode"] is AutoresetMode.SAME_STEP
+    assert env.autoreset_mode is AutoresetMode.SAME_STEP  # where TorchRL looks for it
     assert (env.num_envs, env.single_action_space.shape) == (2, (5,))
     default = gymnasium.make_vec("swarm_mj/Flocking-v0").metadata["autoreset_mode"]
     assert default is AutoresetMode.NEXT_STEP
