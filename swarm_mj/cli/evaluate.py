@@ -39,7 +39,7 @@ class EvaluateOptions(PolicyOptions):
         "--csv, --resume continues)."
     )
     policy: tuple[str, ...] = setting(
-        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", convert=normalised
+        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", convert=normalised, is_common=True
     )
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")
@@ -47,13 +47,16 @@ class EvaluateOptions(PolicyOptions):
     jobs: int = same_as(Processes, "jobs")
     missions: tuple[Mission, ...] = several_missions()
     json: Path | None = output_option(
-        None, "write all figures and each mission's costs", metavar="FILE.json"
+        None, "write all figures and each mission's costs", metavar="FILE.json", is_common=True
     )
     csv: Path | None = output_option(
-        None, "write all figures, one row a result", metavar="FILE.csv"
+        None, "write all figures, one row a result", metavar="FILE.csv", is_common=True
     )
     plot: Path | None = output_option(
-        None, "draw the policies' ages, the lowest first", metavar="FILE.png|.svg|.pdf"
+        None,
+        "draw the policies' ages, the lowest first",
+        metavar="FILE.png|.svg|.pdf",
+        is_common=True,
     )
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)

@@ -47,18 +47,23 @@ class FlyOptions(PolicyOptions):
         "planner",
         f"{NAMES}, a directory with a learned policy, or module:Name of your own",
         convert=registry.normalised,
+        is_common=True,
     )
-    seed: int = setting(1, "the same seed is the same mission")
+    seed: int = setting(1, "the same seed is the same mission", is_common=True)
     mission: Mission = one_mission()
     record: Path | None = output_option(
-        None, "the replay", metavar="FILE.rrd", shown=f"a fresh name under {REPLAYS}/"
+        None,
+        "the replay",
+        metavar="FILE.rrd",
+        shown=f"a fresh name under {REPLAYS}/",
+        is_common=True,
     )
-    no_record: bool = output_option(False, "record no replay")
-    json: Path | None = output_option(None, "write a summary")
+    no_record: bool = output_option(False, "record no replay", is_common=True)
+    json: Path | None = output_option(None, "write a summary", is_common=True)
     force: bool = output_option(False, "replace existing files")
     yes: bool = output_option(False, YES)
     observer: int = output_option(0, "the robot whose knowledge the replay shows")
-    view: bool = output_option(False, "open the replay afterwards")
+    view: bool = output_option(False, "open the replay afterwards", is_common=True)
 
 
 def run(options: FlyOptions) -> int:

@@ -18,6 +18,8 @@ NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
 _policy = partial(setting, group="policies")
 TUNED = "tuned for the regime"
+# What most people set: `--help` shows these, and `--help-all` the others, too.
+COMMON = ("preset", "task", "num_robots", "range_ratio", "num_windows", "arena")
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
 
 
@@ -108,6 +110,7 @@ def _mission_options(*, is_many: bool = False) -> Iterator[Field[Any]]:
     heading = "missions: each takes several values; those multiply" if is_many else "mission"
     for spec in SPECS:
         about = {"group": heading, **spec.metadata, "shown": _default_of(spec), "is_many": is_many}
+        about["is_common"] = spec.name in COMMON
         yield nested_option(spec, f"mission.{spec.name}", **about)
 
 

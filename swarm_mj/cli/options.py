@@ -6,7 +6,7 @@ the last of `--robots 10 --robots 20`.
 
 import argparse
 import sys
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Container, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import MISSING, Field, field, fields
 from functools import partial
@@ -29,11 +29,26 @@ from swarm_mj.system.fields import (
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 output_option = partial(setting, group="output")  # under this heading of the help
+HELP_ALL = "help_all"
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
 
 class Parser(argparse.ArgumentParser):
-    """A parser that complains in one line."""
+    """A parser that complains in one line, and whose help may leave out what few people need."""
+
+    rare: frozenset[str] = frozenset()  # destinations that only `--help-all` shows
+
+    def format_help(self) -> str:
+        """Return the help; its last line says how to see the options that it leaves out."""
+        if not self.rare:
+            return super().format_help()
+        titles = [
+            str(group.title).partition(",")[0]
+            for group in self._action_groups
+            if group._group_actions and {each.dest for each in group._group_actions} <= self.rare
+        ]
+        left_out = f"{self.prog} --help-all shows {len(self.rare)} more: {', '.join(titles)}"
+        return f"{super().format_help()}\n{left_out}\n"
 
     def known(self, arguments: Sequence[str]) -> argparse.Namespace:
         """Return the values typed; refuse an unknown flag and name the likely one."""
@@ -49,11 +64,29 @@ class Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
+class _HelpAll(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
+        """Print the help with the options that most people do not need; exit."""
+        assert isinstance(parser, Parser)
+        parser.rare, parser.formatter_class = frozenset(), _FORMATTER
+        parser.print_help()
+        parser.exit()
+
+
 class _Formatter(argparse.HelpFormatter):
+    def __init__(self, *given: Any, rare: Container[str] = (), **more: Any) -> None:
+        super().__init__(*given, **more)
+        self._rare = rare
+
+    def add_argument(self, action: argparse.Action) -> None:
+        """Add an option, unless the help leaves it out."""
+        if action.dest not in self._rare:
+            super().add_argument(action)
+
     def _format_action_invocation(self, action: argparse.Action) -> str:
         """Return a flag without those that it had in earlier releases."""
         shown = copy(action)
-        if shown.dest != "help":
+        if shown.dest not in ("help", HELP_ALL):
             shown.option_strings = action.option_strings[:1]
         return super()._format_action_invocation(shown)
 
@@ -62,6 +95,9 @@ class _Formatter(argparse.HelpFormatter):
         if action.nargs == "+":
             return f"{action.metavar} ..."
         return super()._format_args(action, default_metavar or "")
+
+
+_FORMATTER = partial(_Formatter, max_help_position=26)
 
 
 def nested(
@@ -134,9 +170,13 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         usage=" ".join([prog, *needed, "[OPTIONS]"]),
         description=summary,
         epilog=getattr(kind, "EPILOG", None),
-        formatter_class=partial(_Formatter, max_help_position=26),
+        formatter_class=_FORMATTER,
         argument_default=argparse.SUPPRESS,
     )
+    if rare := _rare(kind, options):
+        parser.rare, parser.formatter_class = rare, partial(_FORMATTER, rare=rare)
+        about = "show all options and exit"
+        parser.add_argument("--help-all", dest=HELP_ALL, action=_HelpAll, nargs=0, help=about)
     groups: dict[str, Any] = {"": parser}
     for spec in options:
         heading = spec.metadata.get("group", "")
@@ -155,6 +195,22 @@ def _options_of(kind: type[Any]) -> Iterator[Field[Any]]:
             yield spec
 
 
+def _rare(kind: type[Any], options: Sequence[Field[Any]]) -> frozenset[str]:
+    """Return the destinations of options that are not common, if the command says which are."""
+    if not any(spec.metadata.get("is_common") for spec in fields(kind)):
+        return frozenset()
+    always = ("is_common", "is_positional")
+    return frozenset(
+        _place(spec)
+        for spec in options
+        if not (_is_required(spec) or any(spec.metadata.get(each) for each in always))
+    )
+
+
+def _place(spec: Field[Any]) -> str:
+    return spec.metadata.get("place", spec.name)
+
+
 def _is_required(spec: Field[Any]) -> bool:
     is_own = not {"place", "is_positional"} & spec.metadata.keys()  # what is nested has a default
     return is_own and spec.default is MISSING
@@ -162,7 +218,7 @@ def _is_required(spec: Field[Any]) -> bool:
 
 def _add(group: argparse._ActionsContainer, spec: Field[Any]) -> None:
     kind, about = kind_of(spec), spec.metadata
-    place = about.get("place", spec.name)
+    place = _place(spec)
     how: dict[str, Any] = {"help": _help(spec)}
     if kind is bool:
         group.add_argument(*flags_of(spec), dest=place, action="store_true", **how)

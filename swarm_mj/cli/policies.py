@@ -1,4 +1,4 @@
-"""`swarm-mj policies`: who talks when, what each policy knows, what its packets carry."""
+"""`swarm-mj policies`: who talks when, a line each; of one policy what it knows and sends."""
 
 import inspect
 import json
@@ -7,6 +7,7 @@ import sys
 from dataclasses import dataclass
 from typing import Any, ClassVar
 
+from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Column, Table
 
@@ -22,17 +23,14 @@ from swarm_mj.system.terminal import named_values, plain_console, this_command
 
 WINDOWS = {
     "broadcasts": "two broadcasts, which nobody answers",
-    "request": "a request to one robot, and its answer",
+    "request": "a request to a teammate, which answers",
 }
-HEADINGS = {False: "each robot decides by itself; it uses", True: "a centre decides; it uses"}
-LEGEND = """\
-broadcasts: robots may transmit in both halves of a window, to all who hear; nobody answers.
-request: a robot addresses a teammate in the first half, which answers in the second.
-T, M, P: all that the sender knows of its teammates: when it was seen, its state, who passed it on.
-snapshots: two pictures of the whole team, on which robots agree to plan alike.
-links: how often robots decoded and missed each other, and what that says of the channel.
-p: the probability of a transmission, unless you give --probability.
-Bytes and probabilities here are those for"""
+CARRIED = {
+    "T, M, P": "when each teammate was seen, its state, and who passed that on",
+    "snapshots": "two pictures of the whole team, on which robots agree to plan alike",
+    "links": "how often robots decoded and missed each other, and what that says of the channel",
+}
+HEADINGS = {False: "each robot decides by itself", True: "a centre decides"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -47,7 +45,7 @@ class PoliciesOptions:
         metavar="NAME",
         convert=normalised,
     )
-    json: bool = setting(False, "print JSON in place of the table")
+    json: bool = setting(False, "print JSON in place of the table", is_common=True)
     mission: Mission = one_mission()
 
 
@@ -94,18 +92,23 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
 
 
 def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
-    """Print a table of the policies that decide alike, then what its words mean."""
+    """Print a line of each policy: those whose robots decide, then those of a centre."""
     console = Console(highlight=False)
     for is_centralised, heading in HEADINGS.items():
-        table = Table("policy", heading, "packets\ncarry", "window", show_lines=True)
+        table = Table(
+            Column("policy", no_wrap=True),
+            Column(heading, no_wrap=True),
+            Column("packets", justify="right"),
+            box=SIMPLE_HEAD,
+            show_edge=False,
+            pad_edge=False,
+        )
         for each in (each for each in facts if each["is_centralised"] == is_centralised):
-            name, p = each["name"].replace(" --", "\n  --"), each["probability"]
-            name += "" if p is None else f"\n  p = {as_typed(p)}"
-            carried = "\n".join((*_carried(each), f"{each['packet_bytes']:,} bytes"))
-            table.add_row(name, each["uses"], carried, each["window"])
-        console.print(table)
-    more = f"\nMore of one:  {this_command()} policies NAME"
-    plain_console().print(f"{LEGEND} {_described(mission)}.\n{more}")
+            does = each["description"].partition("\n")[0].removesuffix(".")
+            table.add_row(each["name"], does, f"{each['packet_bytes']:,} B")
+        console.print(table, "")
+    more = f"What one knows and sends:  {this_command()} policies NAME"
+    plain_console().print(f"Packets are those for {_described(mission)}.\n{more}")
 
 
 def _print_one(each: dict[str, Any], mission: Mission) -> None:
@@ -113,7 +116,7 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         "in a window": WINDOWS[each["window"]],
-        "packets carry": ", ".join(_carried(each)),
+        "packets carry": "\n".join(_carried(each)),
         "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},
         "source": each["class"],
@@ -131,8 +134,10 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
     plain_console().print(f"{each['description']}\n\nFly it:  {fly}")
 
 
-def _carried(each: dict[str, Any]) -> tuple[str, ...]:
-    return ("T, M, P",) if each["payload"] == "none" else ("T, M, P", each["payload"])
+def _carried(each: dict[str, Any]) -> list[str]:
+    """Return what its packets carry, and what that means where it is known."""
+    names = ["T, M, P"] + ([] if each["payload"] == "none" else [each["payload"]])
+    return [f"{name}: {CARRIED[name]}" if name in CARRIED else name for name in names]
 
 
 def _described(mission: Mission) -> str:

@@ -35,12 +35,14 @@ class TrainOptions:
         "130 interrupted (--resume goes on)."
     )
     out: Path = setting(help="the run's folder", metavar="runs/NAME")
-    resume: bool = setting(False, "go on with the run in OUT")
+    resume: bool = setting(False, "go on with the run in OUT", is_common=True)
     budget: int | None = same_as(Limits, "decisions")
     minutes: float | None = same_as(Limits, "minutes")
     patience: int | None = same_as(Limits, "patience")
     replay_every: int | None = same_as(Limits, "replay_every")
-    init: Path | None = setting(None, "begin with a stored policy", metavar="POLICY")
+    init: Path | None = setting(
+        None, "begin with a stored policy", metavar="POLICY", is_common=True
+    )
     yes: bool = setting(False, YES)
     settings: dict[str, Any] = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()

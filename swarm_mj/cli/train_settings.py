@@ -10,7 +10,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.mission_options import check_in_use
+from swarm_mj.cli.mission_options import COMMON, check_in_use
 from swarm_mj.cli.options import flags_of, nested_option
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
@@ -39,7 +39,10 @@ def setting_options() -> Iterator[Field[Any]]:
     """Yield the settings as options, under a heading for each part of the settings."""
     for place, spec in SPECS.items():
         _, heading = PARTS[place.removesuffix(spec.name)]
-        yield nested_option(spec, place, group=heading, shown=_usual(place))
+        about: dict[str, Any] = {"group": heading, "shown": _usual(place)}
+        if place.startswith("mission."):
+            about["is_common"] = spec.name in COMMON
+        yield nested_option(spec, place, **about)
 
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:

@@ -26,7 +26,7 @@ BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an
 class Processes:
     """How many processes share a study's missions."""
 
-    jobs: int = setting(1, "processes", low=1, high=256)
+    jobs: int = setting(1, "processes", low=1, high=256, is_common=True)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,8 +39,12 @@ class Study:
 
     policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones
     regimes: tuple[Mission, ...]
-    episodes: int = setting(100, "missions of each policy in each regime", low=1, high=MAX_EPISODES)
-    seed: int = setting(1000, "seed of the first mission; the others follow one by one")
+    episodes: int = setting(
+        100, "missions of each policy in each regime", low=1, high=MAX_EPISODES, is_common=True
+    )
+    seed: int = setting(
+        1000, "seed of the first mission; the others follow one by one", is_common=True
+    )
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
     features: tuple[str, ...] = ()  # users' own extractors that learned policies may load
@@ -51,6 +55,7 @@ class Study:
         metavar="POLICY",
         shown="the first policy",
         convert=normalised,
+        is_common=True,
     )
 
     def __post_init__(self) -> None:

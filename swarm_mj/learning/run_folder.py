@@ -40,9 +40,14 @@ class Limits:
         low=1,
         high=MAX_DECISIONS,
         shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
+        is_common=True,
     )
     minutes: float | None = setting(
-        None, "stop after so long, in all, evaluations included", low=1e-9, high=1e6
+        None,
+        "stop after so long, in all, evaluations included",
+        low=1e-9,
+        high=1e6,
+        is_common=True,
     )
     replay_every: int | None = setting(
         None,

@@ -87,10 +87,14 @@ class Training:
         label="credit",
         flag="--credit",
         choices=get_args(CreditAssignment),
+        is_common=True,
     )
     mission: Mission
     robots: tuple[int, ...] = setting(
-        help="size of the team; several are trained on together", low=2, high=MAX_ROBOTS
+        help="size of the team; several are trained on together",
+        low=2,
+        high=MAX_ROBOTS,
+        is_common=True,
     )
     features: str = setting(
         "extended",
@@ -102,12 +106,17 @@ class Training:
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
     silence_logit: float = setting(7.0, low=-100.0, high=100.0)
     reward: Reward = setting(
-        "aoi", "the cost to lower; velocity-variance needs --credit team", choices=get_args(Reward)
+        "aoi",
+        "the cost to lower; velocity-variance needs --credit team",
+        choices=get_args(Reward),
+        is_common=True,
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
-    seed: int = setting(0, "the same seed is the same policy", low=0, high=2**63 - 1)
+    seed: int = setting(
+        0, "the same seed is the same policy", low=0, high=2**63 - 1, is_common=True
+    )
     evaluate_every: int = setting(
         10_000,
         "team decisions between two evaluations",

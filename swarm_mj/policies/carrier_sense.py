@@ -20,12 +20,12 @@ from swarm_mj.system.compiled import compiled
 
 
 class CarrierSense(RandomTransmission, CentralisedPolicy):
-    """Every robot broadcasts, unanswered, unless it senses that another began before it.
+    """Robots broadcast unless they sense another's packet.
 
-    p-persistent CSMA, with which IEEE 802.11 agrees on average (Cali, Conti and Gregori 2000): a
-    slot begins with minislots, and in each of them a robot whose channel is idle begins with
-    probability p. So a robot senses those in earlier minislots, but collides with those in its own,
-    and with those too far away to be sensed (hidden terminals).
+    Nobody answers. p-persistent CSMA, with which IEEE 802.11 agrees on average (Cali, Conti and
+    Gregori 2000): a slot begins with minislots, and in each of them a robot whose channel is idle
+    begins with probability p. So a robot senses those in earlier minislots, but collides with those
+    in its own, and with those too far away to be sensed (hidden terminals).
     """
 
     is_centralised = False

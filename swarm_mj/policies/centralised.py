@@ -13,9 +13,10 @@ from swarm_mj.protocol.window import LocalViews
 
 
 class RoundRobin(CentralisedPolicy):
-    """One robot after the other exchanges buffers with the one nearest the centre (IV-C).
+    """Robots exchange buffers with a base in turn (IV-C).
 
-    TDMA around a base station (Miao et al. 2016), chosen anew in each window.
+    TDMA around a base station (Miao et al. 2016): the robot nearest the centre, chosen anew in each
+    window.
     """
 
     uses = "the true positions: a base near the middle talks to each robot in turn"
@@ -32,7 +33,10 @@ class RoundRobin(CentralisedPolicy):
 
 
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
-    """Every robot exchanges buffers with its parent in the tree with probability p (IV-C)."""
+    """Robots call their parent in a spanning tree (IV-C).
+
+    Each exchanges buffers with it with probability p.
+    """
 
     uses = "the true positions at the start: a robot talks to its parent in their spanning tree"
 

@@ -36,7 +36,7 @@ class _Requests(NamedTuple):
 
 
 class GreedyOracle(CentralisedPolicy):
-    """Adds pairs while the age that the window removes grows: myopic, and not optimal.
+    """Adds pairs while that lowers the age; not optimal.
 
     Centralised: it sees all buffers and all true positions. It addresses no robot that sends, even
     where the authors' code would let that robot hear.

@@ -37,12 +37,12 @@ class RandomTransmission(Policy):
 
 
 class RandomFlooding(RandomTransmission, BroadcastPolicy):
-    """Every robot rebroadcasts with probability p, twice per window, unanswered (IV-C).
+    """Every robot broadcasts with probability p (IV-C).
 
-    See Tseng et al., The broadcast storm problem, 2002. As in the authors' code a robot that
-    transmits draws an addressee from the whole team, and is silent if it draws itself: so it
-    transmits with p (N - 1) / N. Packets name the addressee only under their half-duplex rule, by
-    which an addressed robot hears while it sends.
+    It does so in both slots of a window, unanswered (Tseng et al., The broadcast storm problem,
+    2002). As in the authors' code a robot that transmits draws an addressee from the whole team,
+    and is silent if it draws itself: so it transmits with p (N - 1) / N. Packets name the addressee
+    only under their half-duplex rule, by which an addressed robot hears while it sends.
     """
 
     uses = "nothing: it transmits with probability p"
@@ -78,7 +78,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
 
 
 class Aloha(RandomTransmission, BroadcastPolicy):
-    """Every robot broadcasts as often as its neighbourhood bears, unanswered.
+    """The more neighbours a robot has, the less it sends.
 
     In slotted ALOHA (Abramson 1970; Roberts 1975) what counts is the load that all n stations offer
     together, so each of them sends less the more there are. Here a neighbourhood's robots are its
@@ -124,7 +124,7 @@ def num_contenders(
 
 
 class InnovationGossip(RandomTransmission, BroadcastPolicy):
-    """Every robot broadcasts the more likely the more news it has, twice a window, unanswered.
+    """The more news a robot has, the likelier it sends it.
 
     Rumour mongering (Demers et al. 1987) by radio. News is how much a robot's knowledge has become
     fresher since its own last broadcast: the rise of T^{i,j}, its own included, averaged over the

@@ -18,7 +18,7 @@ from swarm_mj.radio.spatial_reuse import keep_joined
 
 
 class Tdma(BroadcastPolicy):
-    """In each slot one robot broadcasts, in a fixed random order of identities, unanswered.
+    """Robots take turns, in a fixed random order.
 
     Time-division multiple access (Miao, Zander, Sung, Slimane: Fundamentals of Mobile Data
     Networks, 2016). Nobody interferes, so every robot in range decodes. The order is drawn for each
@@ -39,7 +39,7 @@ class Tdma(BroadcastPolicy):
 
 
 class SpatialTdma(Tdma):
-    """TDMA in which robots far enough from the owner of the turn broadcast at the same time.
+    """TDMA where robots that are far apart share a slot.
 
     Who joins the owner of the turn is the rule of `radio.spatial_reuse`: each robot predicts from
     its own buffer, alone, which packets its teammates would decode, and robots that believe the

@@ -46,7 +46,8 @@ def setting(default: object = MISSING, help: str = "", **metadata: Any) -> Field
     are `label`, the name in words; `unit`; `source`, where the default comes from; `low` and
     `high`, the range; `choices`, and `is_joined` where several may be joined by commas; and what
     `cli.options` shows: `group`, the heading it stands under; `metavar`; `shown`, the default in
-    words; `is_positional`, for an option without a flag; `flag`, if it is not made from the name;
+    words; `is_positional`, for an option without a flag; `is_common`, for those that
+    `--help` shows and does not leave to `--help-all`; `flag`, if it is not made from the name;
     `convert`, which makes a value of what was typed.
     """
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))

@@ -108,11 +108,49 @@ def test_help_says_meaning_choices_range_unit_and_default(capsys, monkeypatch):
     assert capsys.readouterr().out == HELP
 
 
+@dataclass(frozen=True, kw_only=True)
+class Feast(Picnic):
+    """A picnic whose guests mostly ask for one thing."""
+
+    music: str = setting("none", "to dance to", is_common=True)
+    speed: int = setting(1, "of the dance", group="dances, at night")
+
+
+def test_help_shows_the_common_and_needed_options_and_says_where_the_others_are(capsys):
+    shown = {}
+    for flag in ("--help", "--help-all"):
+        with pytest.raises(SystemExit) as end:
+            parse_options(Feast, [flag], "feast", "Have a feast.")
+        assert end.value.code == 0
+        shown[flag] = capsys.readouterr().out
+    for common in ("WHO", "--place MEADOW", "--music NAME", "--help-all"):
+        assert common in shown["--help"]
+    for rare in ("--cakes", "--hours", "--sizes", "--vegan", "--drink", "--speed"):
+        assert rare not in shown["--help"]
+        assert rare in shown["--help-all"]
+    assert shown["--help"].endswith("\nfeast --help-all shows 6 more: drinks, dances\n")
+    assert "6 more" not in shown["--help-all"]
+    typed = ["ann", "--place", "p", "--cakes", "3"]
+    assert parse_options(Feast, typed, "feast", "").num_cakes == 3
+
+
+@pytest.mark.parametrize("command", ["fly", "evaluate", "train"])
+def test_the_help_of_the_large_commands_is_a_screen_or_so(capsys, command):
+    assert main([command, "--help"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[-1].startswith(f"swarm-mj {command} --help-all shows ")
+    flags = [line for line in lines if line.startswith("  --")]
+    assert len(flags) <= 16
+
+
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_help_fits_into_80_columns_without_noise(capsys, monkeypatch, command):
     monkeypatch.setenv("COLUMNS", "80")
     assert main([command, "--help"]) == 0
-    shown = capsys.readouterr().out
+    brief = capsys.readouterr().out
+    is_folded = "--help-all" in brief
+    assert main([command, "--help-all" if is_folded else "--help"]) == 0
+    shown = brief + capsys.readouterr().out
     assert max(map(len, shown.splitlines())) <= 80
     assert COMMANDS[command] in shown
     for noise in ("None", "MISSING", "()", "[]", "{", "dataclass"):

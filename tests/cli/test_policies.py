@@ -66,19 +66,23 @@ def test_packets_and_probabilities_are_those_of_the_mission_named(capsys):
     assert named["probability"] == tuned_probability("aloha", paper("stationary", num_robots=80))
 
 
-def test_the_table_fits_and_has_every_policy(capsys, monkeypatch):
+def test_the_list_fits_and_has_every_policy(capsys, monkeypatch):
     monkeypatch.setenv("COLUMNS", "80")
     shown = printed(capsys)
-    for name in POLICIES:
-        assert name.partition(" ")[0] in shown
-    assert max(len(line) for line in shown.splitlines() if line[0:1] in "│┃├") <= 80
-    assert f"p = {tuned_probability('mst', MISSION):g}" in shown
+    assert max(map(len, shown.partition("Packets are")[0].splitlines())) <= 80
+    assert "…" not in shown
+    rows = [line.split() for line in shown.splitlines()]
+    named = {name.partition(" ")[0] for name in POLICIES}
+    for name in named:
+        (row,) = (words for words in rows if words[:1] == [name])
+        size = make_policy(name, MISSION).packet(MISSION).num_bytes
+        assert row[-2:] == [f"{size:,}", "B"]
 
 
 def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
     shown = printed(capsys, "spatial-tdma", "--task", "stationary")
     assert "positions in its buffer" in shown
-    assert "TDMA in which robots far enough" in shown
+    assert "TDMA where robots that are far apart share a slot." in shown
     assert "fly --policy spatial-tdma --task stationary" in shown
     save_tiny(here / "mine", "local")
     shown = " ".join(printed(capsys, "mine").replace("│", " ").split())

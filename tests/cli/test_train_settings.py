@@ -29,7 +29,7 @@ def asked(*arguments):
 
 
 def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
-    main(["train", "--help"])
+    main(["train", "--help-all"])
     shown = " ".join(capsys.readouterr().out.split())
     robot, team = (usual_settings(each, paper("stationary"), (40,)) for each in ("robot", "team"))
     for text in (

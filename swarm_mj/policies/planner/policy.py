@@ -45,7 +45,7 @@ from swarm_mj.radio.mission_radio import Belief, radio_of
 
 
 class Planner(BroadcastPolicy):
-    """Every robot plans for the whole team from a snapshot that its teammates hold too."""
+    """All robots make one plan, from shared snapshots."""
 
     uses = (
         "its buffer, the clock, common orders, the area, its prior knowledge of the radio; and "

@@ -48,11 +48,11 @@ NOT_YET = np.iinfo(np.int64).max
 
 
 class RestingPlanner(BroadcastPolicy):
-    """Every robot that knows where everyone rests plans for the whole team; others take turns.
+    """Robots make one plan when they know where all rest.
 
-    Uses the robot's own buffer, its identity, the team's size, the clock, the radio's numbers, what
-    the mission grants of the channel and a common order of turns; and what packets say of links, if
-    it learns.
+    Until then they take turns. Uses the robot's own buffer, its identity, the team's size, the
+    clock, the radio's numbers, what the mission grants of the channel and a common order of turns;
+    and what packets say of links, if it learns.
     """
 
     def __init__(

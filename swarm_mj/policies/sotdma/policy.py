@@ -32,7 +32,7 @@ from swarm_mj.radio.power_law import powers_between, write_powers
 
 
 class SelfOrganisedTdma(BroadcastPolicy):
-    """TDMA whose slots robots choose themselves, announced implicitly by transmitting.
+    """TDMA in which robots choose their slots themselves.
 
     Of what the mission grants of the channel it uses the mean powers.
     """
