@@ -111,14 +111,23 @@ format: $(DEV)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
+# The paper's methods beside two of ours, and ours beside the paper's simplest.
+PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN generalized from 0.25" \
+  "GNN trained at each size" "GNN generalized from 40" \
+  "GNN with credit per robot" "GNN trained on AoI" "GNN trained on velocity variance"
+OURS := planner "planner --payload none" gnn spatial-tdma tdma gossip aloha random-flooding greedy-oracle
+
 figures: setup
 	$(BIN)/python training/paper_figures.py $(ARGS)
 	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force
 	for name in fig2 fig3 fig4 fig5 fig6; do \
 	  $(BIN)/swarm-mj figures training/results/paper-*.csv \
 	    $$(ls training/results/reproduce/$(SCALE)/$$name.csv 2>/dev/null) \
-	    --figure $$name --out assets/figures/paper --force || exit; \
+	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
+	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig4 fig5 fig6 --policy $(OURS) \
+	  --out assets/figures/policies --force
+	$(BIN)/python training/readme_figure.py
 	$(BIN)/python training/learning_figure.py
 	$(BIN)/python training/stability_figure.py
 	$(BIN)/python tools/diagrams.py

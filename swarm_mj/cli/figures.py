@@ -1,5 +1,6 @@
 """`swarm-mj figures`: draws the paper's figures from result files."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -35,6 +36,12 @@ class FiguresOptions:
         FIGURES, "which to draw", choices=FIGURES, shown="all that have points"
     )
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
+    policy: tuple[str, ...] = setting(
+        (),
+        "draw these methods only: policies of the results, or a GNN's name among the published",
+        metavar="NAME",
+        shown="all",
+    )
     force: bool = setting(False, "replace existing figures")
     yes: bool = setting(False, YES)
     flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)
@@ -55,6 +62,7 @@ def run(options: FiguresOptions) -> int:
         from swarm_mj.evaluation.figures.flock import draw_flock
         from swarm_mj.evaluation.figures.style import save
 
+        _check_methods(options.policy, results)
         policy, seed = options.flock_policy, options.flock_seed
         drawn = {}
         for name in paths:
@@ -63,7 +71,7 @@ def run(options: FiguresOptions) -> int:
                 if name == FLOCK:
                     drawn[name] = draw_flock(preset_of(results), policy, seed)
                 else:
-                    drawn[name] = draw(RESULT_FIGURES[name], results)
+                    drawn[name] = draw(RESULT_FIGURES[name], results, options.policy)
             except NoPointsError:
                 is_last_hope = name == FIGURES[-1] and set(drawn) <= {FLOCK}
                 if options.figure != FIGURES or is_last_hope:
@@ -76,6 +84,16 @@ def run(options: FiguresOptions) -> int:
     if left_out := ", ".join(name for name in paths if name not in drawn):
         console.print(f"Left out {left_out}: the results hold no point of them")
     return 0
+
+
+def _check_methods(methods: Sequence[str], results: Sequence[Result]) -> None:
+    """Raise ValueError for a method that neither the results nor the paper's figures have."""
+    from swarm_mj.evaluation.figures.style import LOOKS
+
+    known = dict.fromkeys([*LOOKS, *(result.policy for result in results)])
+    for method in methods:
+        if method not in known:
+            raise ValueError(f"policy must be one of {', '.join(known)}, not {method!r}")
 
 
 def figures_needs(results: tuple[Path, ...], num_files: int) -> Needs:

@@ -43,6 +43,14 @@ def test_only_what_is_asked_for_of_several_files_as_of_one(succeed, tmp_path):
     assert written == ["fig5.pdf", "fig5.svg"]
 
 
+def test_some_methods_only(succeed, tmp_path, results):
+    draw = ("figures", results, "--figure", "fig4", "--format", "pdf")
+    for folder, chosen in {"all": (), "some": ("--policy", "mst", "GNN")}.items():
+        succeed(*draw, "--out", folder, *chosen)
+    every, some = ((tmp_path / name / "fig4.pdf").stat().st_size for name in ("all", "some"))
+    assert some < every
+
+
 def test_nothing_is_overwritten_unasked_and_nothing_written_when_one_is_in_the_way(
     succeed, refusal, tmp_path, results
 ):
@@ -92,6 +100,7 @@ def test_a_missing_file_a_folder_and_two_presets_are_refused(refusal, tmp_path, 
         ("--figure fig9", "figure must be one of fig2, fig3, fig4, fig5, fig6, not 'fig9'"),
         ("--format gif", "format must be one of svg, png, pdf, not 'gif'"),
         ("--figure fig2 --flock-policy nobody", "policy must be one of"),
+        ("--figure fig4 --policy mst nobody", "policy must be one of random-flooding, "),
         ("--figure fig2 --flock-seed -1", "seeds must be"),
     ],
 )

@@ -1,6 +1,6 @@
 """Result figures of the paper: curves with error bars, named at their ends."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from typing import Any
 
 import numpy as np
@@ -8,10 +8,17 @@ from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
+from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.curves import Curve, budgets, curves, results_of
+from swarm_mj.evaluation.figures.curves import (
+    Curve,
+    NoPointsError,
+    budgets,
+    curves,
+    results_of,
+)
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, look_of, styled, write_caption
 from swarm_mj.evaluation.published import Panel, ResultFigure
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
@@ -30,12 +37,30 @@ SHORT = 7  # of a commit's digits
 LINE_IN = 0.165  # from one name to the next
 MORE = "+"  # after the names of methods whose packets carry more than T, M and P
 PLACE = 1.045  # of the axes' width
+ASIDE = 0.02  # likewise, from the end of a curve that ends early to its name
 PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
-def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
-    """Draw our curves and the published ones; raises ValueError as `results_of` and `curves` do."""
+def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[str] = ()) -> Figure:
+    """Draw our curves and the published ones, of these methods or of all.
+
+    Raises ValueError as `results_of` and `curves` do.
+    """
     found = results_of(figure, results)
+    if methods:
+        found = [result for result in found if result.policy in methods] or found[:1]
+    costs = [curves(figure, panel.cost, found) for panel in figure.panels]
+    if methods:
+        costs = [[curve for curve in of if curve.method in methods] for of in costs]
+        if not all(costs):
+            raise NoPointsError(f"{figure.name} has no points of {', '.join(methods)}")
+    return draw_curves(figure, found, costs)
+
+
+def draw_curves(
+    figure: ResultFigure, found: Sequence[Result], costs: Sequence[Sequence[Curve]]
+) -> Figure:
+    """Draw the curves of each of the figure's costs, with the origin of the results below."""
     num_panels = len(figure.panels)
     height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
     with styled():
@@ -48,8 +73,7 @@ def draw(figure: ResultFigure, results: Sequence[Result]) -> Figure:
             bottom=BOTTOM_IN / height_in,
             hspace=GAP_IN / PANEL_IN,
         )
-        for axes, panel in zip(grid[:, 0], figure.panels, strict=True):
-            shown = curves(figure, panel.cost, found)
+        for axes, panel, shown in zip(grid[:, 0], figure.panels, costs, strict=True):
             _set_axes(axes, figure, panel, shown)
             for curve in shown:
                 _draw_curve(axes, curve)
@@ -152,34 +176,44 @@ def _head(
 def name_ends(axes: Axes, shown: Sequence[Curve]) -> None:
     """Write each method's name next to the axes, as close to the end of its curve as possible.
 
-    Names of methods that only the paper has are slanted. The limits of the axes must be set.
+    Curves that end earlier are named there. Names of methods that only the paper has are slanted.
+    The limits of the axes must be set.
     """
-    named = {curve.method: curve for curve in shown}  # ours come last
-    ends = [(curve.x[-1], curve.mean[-1]) for curve in named.values()]
-    fraction = axes.transAxes.inverted().transform(axes.transData.transform(ends))
-    places = keep_apart(fraction[:, 1], LINE_IN / (axes.bbox.height / axes.figure.dpi))
-    for curve, end, place in zip(named.values(), ends, places, strict=True):
-        look = look_of(curve.method)
-        line = {"color": look.colour, "linestyle": "--" if curve.is_published else "-"}
-        axes.annotate(
-            name_of(curve),
-            xy=end,
-            xytext=(PLACE, place),
-            textcoords="axes fraction",
-            color=look.ink,
-            fontsize=8,
-            fontstyle="italic" if curve.is_published else "normal",
-            va="center",
-            annotation_clip=False,
-            arrowprops={
-                **line,
-                "arrowstyle": "-",
-                "linewidth": 0.6,
-                "shrinkA": 1.0,
-                "shrinkB": 4.0,
-                "relpos": (0.0, 0.5),
-            },
-        )
+    named = {curve.method: curve for curve in shown}.values()  # ours come last
+    last = max(curve.x[-1] for curve in shown)
+    for x in {curve.x[-1] for curve in named}:
+        curves_here = [curve for curve in named if curve.x[-1] == x]
+        ends = [(x, curve.mean[-1]) for curve in curves_here]
+        fraction = axes.transAxes.inverted().transform(axes.transData.transform(ends))
+        across = PLACE if x == last else fraction[0, 0] + ASIDE
+        places = keep_apart(fraction[:, 1], LINE_IN / (axes.bbox.height / axes.figure.dpi))
+        for curve, end, place in zip(curves_here, ends, places, strict=True):
+            _name(axes, curve, end, (across, place))
+
+
+def _name(axes: Axes, curve: Curve, end: tuple[float, float], place: tuple[float, float]) -> None:
+    look = look_of(curve.method)
+    line = {"color": look.colour, "linestyle": "--" if curve.is_published else "-"}
+    axes.annotate(
+        name_of(curve),
+        xy=end,
+        xytext=place,
+        textcoords="axes fraction",
+        color=look.ink,
+        fontsize=8,
+        fontstyle="italic" if curve.is_published else "normal",
+        va="center",
+        annotation_clip=False,
+        path_effects=[withStroke(linewidth=2.5, foreground="white")],  # over other curves
+        arrowprops={
+            **line,
+            "arrowstyle": "-",
+            "linewidth": 0.6,
+            "shrinkA": 1.0,
+            "shrinkB": 4.0,
+            "relpos": (0.0, 0.5),
+        },
+    )
 
 
 def name_of(curve: Curve) -> str:

@@ -8,12 +8,14 @@ from matplotlib.text import Text
 from scipy.optimize import minimize
 from synthetic import everything, result, sweep
 
+from swarm_mj.evaluation.figures.curves import NoPointsError
 from swarm_mj.evaluation.figures.drawing import draw, keep_apart
-from swarm_mj.evaluation.figures.style import LOOKS
+from swarm_mj.evaluation.figures.style import BETTER, LOOKS
 from swarm_mj.evaluation.published import RESULT_FIGURES
 
 FIG3, FIG4, _, FIG6 = RESULT_FIGURES.values()
 FLOODING = {0.2: (70.0, 3.0), 0.5: (16.0, 0.5), 1.0: (12.0, 0.25)}
+PAYLOADS = {"planner": "snapshots"}
 
 
 def bars(axes):
@@ -71,6 +73,26 @@ def test_every_method_is_named_once_and_slanted_if_only_the_paper_has_it():
     }
     assert names(axes)["something-new"].xy == (0.25, 1.0)
     assert names(axes)["GNN"].xy == (1.0, 8.57)
+
+
+def test_a_curve_that_ends_early_is_named_beside_its_end():
+    """A leader to the right edge would cross the others' curves like data."""
+    ours = [*sweep("random-flooding", "range_ratio", FLOODING), result("tdma", aoi_mean=26.0)]
+    (axes,) = draw(FIG4, ours).axes
+    ends = axes.transAxes.inverted().transform(axes.transData.transform([(0.25, 26.0)]))
+    np.testing.assert_allclose(names(axes)["TDMA"].get_position(), ends[0] + (0.02, 0.0))
+    assert names(axes)["random flooding"].get_position()[0] > 1.0
+
+
+def test_only_what_is_asked_for_is_drawn():
+    """The published curve of a policy, and a GNN of the paper's."""
+    ours = [result("mst"), result("tdma", commit="def456"), result("gossip")]
+    drawing = draw(FIG4, ours, ("mst", "GNN", "gossip"))
+    (axes,) = drawing.axes
+    assert set(bars(axes)) == {"MST", "MST, published", "GNN, published", "gossip"}
+    assert "def456" not in drawing.texts[-1].get_text()
+    with pytest.raises(NoPointsError, match="fig4 has no points of aloha"):
+        draw(FIG4, ours, ("aloha",))
 
 
 def test_who_carries_more_than_the_paper_s_packets_is_marked_and_the_mark_explained():
@@ -152,11 +174,10 @@ def test_ticks_are_the_published_places_and_all_curves_are_inside():
 
 
 def test_nothing_that_is_written_overlaps_or_leaves_the_page():
+    ends = {"range_ratio": 1.0}  # of the published curves
     every = [
-        result(
-            policy, aoi_mean=12.0 + 0.1 * n, payload="snapshots" if policy == "planner" else None
-        )
-        for n, policy in enumerate(LOOKS)
+        result(policy, aoi_mean=12.0 + 0.1 * n, **ends, payload=PAYLOADS.get(policy))
+        for n, policy in enumerate(sorted({*LOOKS} - {BETTER}))
     ]
     drawing = draw(FIG4, every)
     FigureCanvasAgg(drawing).draw()
