@@ -16,7 +16,7 @@ from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 from swarm_mj.simulation.rollout import Summary
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
-CENTRE = "a centre that is told where all are"
+CENTRE = "a centre that knows all positions"
 FATES = {  # rows of the table: a count among the numbers, and its share of the packets sent
     "  heard by at least one robot": "packets_heard",
     "  delivered": "packets_delivered",

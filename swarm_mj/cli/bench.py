@@ -58,7 +58,7 @@ def run(options: BenchOptions) -> int:
 
 
 def noise(steps_us: Sequence[float]) -> str:
-    """Return how far one number wanders that should always be the same."""
+    """Return the spread of a measurement that should always be the same."""
     least, most = min(steps_us), max(steps_us)
     spread = most / least - 1.0
     busy = "; the machine was busy, so measure again when it is not" if spread > BUSY else ""
@@ -69,7 +69,7 @@ def noise(steps_us: Sequence[float]) -> str:
 
 
 def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:
-    """Measure all that is asked for, and say what is under way."""
+    """Make all requested measurements, and print which one is running."""
     say("Measuring missions side by side ...")
     columns = {
         str(num_missions): list(simulation_rows(num_missions, options.threads, options.seconds))

@@ -1,6 +1,6 @@
 """How fast the simulation is: windows per second, whole and in parts, and what evaluations take.
 
-The yardstick is a plain mj_step in the same run. A measurement takes about the seconds it is given.
+The yardstick is a plain mj_step in the same run. A measurement takes about `seconds`.
 """
 
 import time
@@ -87,7 +87,7 @@ def simulation_rows(num_missions: int, num_threads: int, seconds: float) -> Iter
 def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
     """Time the same walks where there is more than free space, per window of one mission.
 
-    The two sides of a ratio are measured in turn, so that a machine's moods reach both.
+    The two sides of a ratio are measured in turn, so that other load on the machine affects both.
     """
 
     def window_us(**world: Any) -> tuple[float, float]:
@@ -112,7 +112,7 @@ def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
 def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterator[Row]:
     """Time an evaluation of the paper's baselines, the oracle, and the planner.
 
-    The jobs share the baselines' missions, and starting them counts.
+    The jobs share the baselines' missions. The time to start them is included.
     """
     for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
         _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))
@@ -145,8 +145,8 @@ def _flying_s(
 def _planned_window_us(mission: Mission, seconds: float) -> float:
     """Time a window of a mission that the planner flies [µs].
 
-    As many windows as robots are timed together: they are two of its epochs, of which each begins
-    with a plan.
+    N windows are timed together, for N robots. These are two epochs of the planner, and each epoch
+    begins with a plan.
     """
     swarm, planner = Swarm(mission, [0]), make_policy("planner", mission)
     swarm.start(planner)

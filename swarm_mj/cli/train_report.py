@@ -61,9 +61,9 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     training, is_chosen = run.training, progress.choice is not None
     choice = progress.choice or _best_so_far(run, progress, progress.best)
     cost = training.reward if is_chosen else "aoi"  # evaluations tell the error of the age alone
-    chosen = "nothing" if is_chosen else "the policy"
+    use = "not used to select the policy" if is_chosen else "which selected the policy"
     rows = {
-        "missions": f"{choice.num_missions} of each team size, which chose {chosen}",
+        "missions": f"{choice.num_missions} of each team size, {use}",
         "policy kept": f"{_amount(choice.kept, cost)}, after {choice.decisions:,} decisions",
     }
     for name, each in choice.others.items():
@@ -100,8 +100,8 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
     if choice is None:
         if progress.best is not None:
             yield (
-                "The policy kept is the best of the evaluations, on the same missions: its age "
-                "flatters. A run that ends chooses on others."
+                "The policy kept is the best of the evaluations, on the same missions: so "
+                "its age is biased. A run that ends selects on fresh missions."
             )
         return
     if choice.decisions == 0:

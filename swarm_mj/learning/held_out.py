@@ -159,7 +159,7 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
 def record_replay(
     training: Training, network: AggregationGnn, decisions: int, folder: Path
 ) -> None:
-    """Record the first held-out mission, as the network flies it after so many team decisions."""
+    """Record the first held-out mission, as the network flies it after this many team decisions."""
     from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
     mission = replace(training.mission, num_robots=training.robots[0])

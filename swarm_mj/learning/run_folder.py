@@ -35,7 +35,7 @@ class Limits:
 
     decisions: int | None = setting(
         None,
-        "stop after so many decisions of teams, in all",
+        "stop after this many team decisions, earlier sessions included",
         label="budget",
         low=1,
         high=MAX_DECISIONS,
@@ -44,21 +44,21 @@ class Limits:
     )
     minutes: float | None = setting(
         None,
-        "stop after so long, in all, evaluations included",
+        "stop after this many minutes, evaluations and earlier sessions included",
         low=1e-9,
         high=1e6,
         is_common=True,
     )
     replay_every: int | None = setting(
         None,
-        "record the first held-out mission in OUT/replays whenever so many decisions are made",
+        "record the first held-out mission in OUT/replays every N team decisions",
         label="replay-every",
         low=1,
         high=MAX_DECISIONS,
     )
     patience: int | None = setting(
         None,
-        "stop after so many evaluations in a row without gain; 0: never",
+        "stop after this many evaluations in a row without improvement; 0: never",
         low=0,
         high=MAX_EVALUATIONS,
         shown=f"{PATIENCE['robot']}, team: {PATIENCE['team']}",

@@ -229,7 +229,7 @@ class TrainingSession(BaseCallback):
         self._save()
 
     def _keep(self, decisions: int, costs: Row, choice: Choice | None) -> None:
-        """Store the policy of the evaluation after so many decisions, with its costs."""
+        """Store the policy of the evaluation after this many decisions, with its costs."""
         training = self._training
         (row,) = (each for each in self.progress.curve if each["decisions"] == decisions)
         made = {"command": self._run.command, "decisions": decisions, "minutes": row["minutes"]}

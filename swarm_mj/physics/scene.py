@@ -34,9 +34,9 @@ def timestep_s(mission: Mission) -> float:
 def num_substeps(mission: Mission) -> int:
     """MuJoCo steps per window.
 
-    In `contact` so many that none is longer than 10 ms, nor long enough to leave the area by more
-    than the robot's radius: a limit acts one step after it was crossed. Robots that collide come
-    towards each other twice as fast.
+    In `contact` physics, a step takes at most 10 ms, and a robot leaves the area by at most its
+    radius in one step, because a limit acts one step after it was crossed. Robots that collide
+    approach each other twice as fast.
     """
     if mission.physics == "exact":
         return 1
@@ -111,7 +111,7 @@ def _movable(spec: MjSpec) -> list[str]:
 def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
     """Put the robots at their start: as the model's own pose, and with velocities as a keyframe.
 
-    A viewer opens a model in its own pose and loads a keyframe only when told to.
+    A viewer opens a model in its own pose and loads a keyframe only on request.
     """
     position_m, velocity_mps = start.position_m[0], start.velocity_mps[0]
     for i, (x, y) in enumerate(position_m.tolist()):

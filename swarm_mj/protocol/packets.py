@@ -77,7 +77,7 @@ def packet_of(mission: Mission, payload: tuple[PacketField, ...] = ()) -> Packet
     header = (
         identity("sender", mission),
         identity("addressee", mission),
-        PacketField(name="robots told of", bits=1, count=mission.num_robots),
+        PacketField(name="robots described", bits=1, count=mission.num_robots),
     )
     entry = (
         age("age (T)"),

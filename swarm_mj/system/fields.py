@@ -20,7 +20,7 @@ KINDS: dict[Any, tuple[type, str]] = {
     bool: (bool, "True or False"),
 }
 # Fields by the names that they once had. Stored files are read with either name; command lines take
-# both; Python is told the new one.
+# both; Python gets the new one.
 FORMER_NAMES = {
     "known": "prior_knowledge",
     "switched_off": "failure_fraction",

@@ -32,7 +32,7 @@ def version() -> str:
 
 
 def code_digest() -> str:
-    """Return a hash of the package's code and data, which tells changes that no commit tells."""
+    """Return a hash of the package's code and data, which changes before a commit, too."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
     for path in sorted([*package.rglob("*.py"), *package.rglob("*.csv")]):

@@ -1,4 +1,4 @@
-"""Strict reading of files that others wrote: nothing is believed that was not checked.
+"""Strict reading of files that others wrote: every value is checked.
 
 Files are regular, and no larger than expected. The rows of a table have as many cells as it has
 columns. JSON has the keys of a dataclass, all of them and no others, and its numbers are finite.

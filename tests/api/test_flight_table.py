@@ -96,7 +96,7 @@ ROWS = [  # policy, task, numbers, and the rows that they make
     (*(WITHOUT_PAYLOAD, "stationary", BROADCAST), {"packets carry": "the sender's buffer"}),
     (
         *("round-robin", "stationary", BROADCAST),
-        {"who decides": "a centre that is told where all are"},
+        {"who decides": "a centre that knows all positions"},
     ),
 ]
 

@@ -51,7 +51,7 @@ def test_the_policy_kept_stands_beside_others_with_what_they_know():
     assert oracle.startswith("12.00 windows, on 4 of 12 missions of the evaluations; knows")
     assert rows.pop("spatial-tdma").startswith("21.00 ± 0.50 windows; ")
     assert rows == {
-        "missions": "32 of each team size, which chose nothing",
+        "missions": "32 of each team size, not used to select the policy",
         "policy kept": "22.25 ± 0.50 windows, after 10,000 decisions",
         "tdma": "25.00 ± 0.75 windows; robots take turns that were agreed beforehand",
         "the policy it began with": "48.00 windows",
@@ -109,13 +109,13 @@ def test_an_early_stop_is_said_with_the_way_on():
     assert not has_stopped_early(done, stalled)
 
 
-def test_an_interrupted_run_says_that_its_age_flatters():
+def test_an_interrupted_run_says_that_its_age_is_biased():
     rows = report(RUN, progress(None))
-    assert rows["missions"] == "12 of each team size, which chose the policy"
+    assert rows["missions"] == "12 of each team size, which selected the policy"
     assert rows["policy kept"] == "21.50 ± 0.40 windows, after 10,000 decisions"
     assert rows["tdma"].startswith("25.00 windows; ")
     assert rows["greedy-oracle"].startswith("12.00 windows, on 4 of 12 missions")
-    assert "flatters" in next(verdicts(RUN, progress(None)))
+    assert "biased" in next(verdicts(RUN, progress(None)))
 
 
 def test_flocks_are_judged_by_their_velocity_variance():

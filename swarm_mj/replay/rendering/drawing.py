@@ -196,7 +196,7 @@ class AgePlot:
         small, inner, footages = font(SMALL * self._size), self._inner, self._footages
         title = "mean age of information [windows]"
         draw.rectangle(inner, palette.GRID)
-        # Two missions' columns could not be told apart.
+        # Two missions' columns would look alike.
         if len(footages) == 1 and np.any(footages[0].is_cut_off):
             title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
             # Columns: the share of the others that is cut off from the observer.

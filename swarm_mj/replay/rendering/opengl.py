@@ -13,7 +13,7 @@ from typing import Any
 
 from swarm_mj.system.processes import attempt
 
-CHOICE = "MUJOCO_GL"  # the variable by which people choose, and MuJoCo's renderer is told
+CHOICE = "MUJOCO_GL"  # the variable by which users and MuJoCo's renderer choose OpenGL's backend
 PYOPENGL = "PYOPENGL_PLATFORM"  # PyOpenGL's own, which MuJoCo and dm_control set
 OFF = ("disable", "disabled", "off", "false", "0")
 ON = ("enable", "enabled", "on", "true", "1")
