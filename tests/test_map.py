@@ -80,7 +80,11 @@ def imports(path):
         ("mission/geometry", {"system.compiled"}),
         ("mission/placement", {"system.compiled", "mission.geometry", "mission.specification"}),
         ("radio/reception", {"system.compiled"}),
-        ("radio/free_space", {"system.compiled", "mission.geometry", "radio.reception"}),
+        ("system/decibels", set()),
+        (
+            "radio/free_space",
+            {"system.compiled", "system.decibels", "mission.geometry", "radio.reception"},
+        ),
         ("physics/state", set()),
         ("protocol/timestamps", {"system.compiled"}),
         ("protocol/buffers", {"system.compiled", "physics.state", "protocol.timestamps"}),

@@ -31,6 +31,9 @@ if TYPE_CHECKING:  # each is slow to import
 # pandas prints only the ends of a wide table, so these columns stand there.
 FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem")
 LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
+# Of each age that is counted and of each mission, in memory and in a file [bytes].
+AGE_COUNT, AGE_COUNT_IN_FILE = 50.0, 5.0
+RESULT, RESULT_IN_FILE = 1000.0, 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -192,10 +195,11 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
     )
     torch = needs.OF_TORCH if any(map(is_learned, study.policies)) else 0.0
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
+    under_way = min(num_jobs, len(batches)) * largest
     return Needs(
-        memory=min(num_jobs, len(batches)) * largest + 50.0 * ages + 1000.0 * study.num_missions,
+        memory=under_way + AGE_COUNT * ages + RESULT * study.num_missions,
         addresses=needs.ADDRESSES + torch,
-        file=5.0 * ages + 300.0 * study.num_missions,
+        file=AGE_COUNT_IN_FILE * ages + RESULT_IN_FILE * study.num_missions,
     )
 
 

@@ -144,7 +144,8 @@ def _mean_difference(
                 total, num_counted = 0.0, 0
                 for j in range(num_robots):
                     known = known_mps[b, i, j, axis]
-                    if known != 0.0 if is_counted is None else is_counted[b, i, j]:
+                    counts = known != 0.0 if is_counted is None else is_counted[b, i, j]
+                    if counts:
                         total += known - velocity_mps[b, i, axis]
                         num_counted += 1
                 if num_counted:

@@ -13,8 +13,8 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
-from swarm_mj.protocol.window import SLOT_WINDOWS, Phase, channel_at, of_active, respondents
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, merge_timestamps, observe_own
+from swarm_mj.protocol.window import Phase, channel_at, of_active, respondents
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
@@ -41,38 +41,59 @@ def credits_of(
         recipient = of_active(is_active, recipient)
         # Nothing is gained by news of a robot that has failed: it is not counted in the age.
         timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
+    at_once = isinstance(channel, (FreeSpaceRadio, VaryingChannel))
+    replay = _credits_at_once if at_once else _credits_in_turn
+    return replay(timestamp, position_m, recipient, channel, now, is_active)
+
+
+def _credits_at_once(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N 2"],
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    is_active: Bool[np.ndarray, "B N"] | None,
+) -> Float[np.ndarray, "B N"]:
+    """Replay all windows as rows of one batch: ten times faster than one by one."""
+    num_missions, num_robots = recipient.shape
+    mission, sender = np.nonzero(recipient != np.arange(num_robots))
+    without = recipient[mission]  # one row per sender: everyone's recipients without it
+    without[np.arange(sender.size), sender] = sender
+    rows = np.concatenate([np.arange(num_missions), mission])  # the windows as they were come first
+    gained = gain(
+        timestamp,
+        position_m[rows],
+        np.concatenate([recipient, without]),
+        channel,
+        now[rows],
+        mission=rows,
+        is_active=None if is_active is None else is_active[rows],
+    )
+    credit = np.zeros(recipient.shape)
+    credit[mission, sender] = gained[mission] - gained[num_missions:]
+    return credit
+
+
+def _credits_in_turn(
+    timestamp: Float[np.ndarray, "B N N"],
+    position_m: Float[np.ndarray, "B N 2"],
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    is_active: Bool[np.ndarray, "B N"] | None,
+) -> Float[np.ndarray, "B N"]:
+    """Replay B missions at a time: a user's channel meets them as in flight, draws included."""
     num_missions, num_robots = recipient.shape
     robots, missions = np.arange(num_robots), np.arange(num_missions)
-    sends = recipient != robots
-    credit = np.zeros(recipient.shape)
-    if isinstance(channel, (FreeSpaceRadio, VaryingChannel)):
-        mission, sender = np.nonzero(sends)
-        alone = recipient[mission]  # one row per sender: everyone's recipients without it
-        alone[np.arange(sender.size), sender] = sender
-        # All rows at once, the windows as they were first: ten times faster than one by one.
-        rows = np.concatenate([missions, mission])
-        sent_to = np.concatenate([recipient, alone])
-        took_part = None if is_active is None else is_active[rows]
-        gained = gain(
-            timestamp,
-            position_m[rows],
-            sent_to,
-            channel,
-            now[rows],
-            mission=rows,
-            is_active=took_part,
-        )
-        credit[mission, sender] = gained[mission] - gained[num_missions:]
-        return credit
 
     def replayed(recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B"]:
-        # A user's own channel meets B missions at a time, as in flight, and draws the same numbers.
         again = snapshot_channel(channel)
         return gain(
             timestamp, position_m, recipient, again, now, mission=missions, is_active=is_active
         )
 
-    together = replayed(recipient)
+    together, sends = replayed(recipient), recipient != robots
+    credit = np.zeros(recipient.shape)
     turn = np.cumsum(sends, axis=1) * sends  # 1 for the first sender of a mission, and so on
     for n in range(1, int(turn.max(initial=0)) + 1):
         gained = replayed(np.where(turn == n, robots, recipient))

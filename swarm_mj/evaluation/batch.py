@@ -12,7 +12,7 @@ from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import WindowRecord, rollout
@@ -26,7 +26,7 @@ TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")  # of `cost
 class Batch:
     """The work of one process at a time."""
 
-    policy: str  # a name among `POLICIES`, or a directory
+    policy: str  # what `make_policy` takes
     probability: float | None  # of a transmission; None is the policy's own
     is_deterministic: bool = False  # a learned policy takes its most probable recipient
     features: tuple[str, ...] = ()  # users' own extractors that a learned policy may load

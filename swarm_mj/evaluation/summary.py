@@ -16,7 +16,7 @@ from swarm_mj.evaluation.results import COLUMNS, Result
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import flown_name
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.writing import write_json
 
 COSTS = ("aoi", "velocity_variance")  # of each mission

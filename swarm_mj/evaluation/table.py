@@ -15,7 +15,7 @@ from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
-NAME_WIDTH = 17  # of a policy that fits in there; a longer directory's name widens the table
+NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the table
 NONE = "-"
 
 

@@ -38,7 +38,7 @@ class GraphVecEnv(SwarmVecEnv):
 
         Raises ValueError if they cannot be shared out evenly, or a size would have no batch.
         """
-        self.rng, self._agent_reward = rng, training.reward
+        self.rng, self._team_reward = rng, training.reward
         self.agent, self.batches = training.credit_assignment, _make_batches(training)
         self.num_nodes = max(training.robots)  # of every graph
         for n, batch in enumerate(self.batches):
@@ -94,7 +94,7 @@ class GraphVecEnv(SwarmVecEnv):
         return np.repeat(is_cut, [envs.stop - envs.start for envs in self._envs])
 
     def _scaled(self, reward: np.ndarray, batch: MissionBatch) -> np.ndarray:
-        is_age = self.agent == "team" and self._agent_reward == "aoi"
+        is_age = self.agent == "team" and self._team_reward == "aoi"
         return reward / batch.mission.num_windows if is_age else reward
 
     def _infos(self) -> list[dict[str, Any]]:

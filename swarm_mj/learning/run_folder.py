@@ -26,6 +26,9 @@ FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
 MAX_BYTES = 1_000_000  # of the settings
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 PATIENCE = {"robot": 8, "team": 40}  # evaluations
+KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
+WINDOW_BYTES = 2.0  # of the checkpoint, for each robot and window of a mission
+CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
 MAX_DECISIONS, MAX_EVALUATIONS = 10**12, 1_000_000
 
 
@@ -153,7 +156,7 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - needs.LIBRARIES - needs.TORCH) + passes
-    file = 2.0 * training.missions * size * first.num_windows + 0.01 * needs.GB
+    file = WINDOW_BYTES * training.missions * size * first.num_windows + CHECKPOINT_BYTES
     addresses = needs.ADDRESSES + needs.OF_TORCH
     if limits.replay_every is None:
         return needs.Needs(memory=memory, addresses=addresses, file=file)
@@ -180,7 +183,7 @@ def passes_bytes(training: Training) -> float:
     """Return the size of the activations that a minibatch keeps for its gradient."""
     nodes, ppo, shape = max(training.robots), training.ppo, training.network
     rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches
-    kept = 0.4 if training.drops_silence else 1.0  # of the rows
+    kept = KEPT_ROWS if training.drops_silence else 1.0
     directions = 2 if shape.edges == "both" else 1
     layers = (shape.receptive_field + 1) * (shape.depth + 1) * (2 + directions)
     networks = 1 if training.shares_trunk else 2

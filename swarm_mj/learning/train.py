@@ -78,7 +78,8 @@ class TrainingSession(BaseCallback):
         elif run.init is not None:
             path = own if own.exists() else run.init
             init = read_policy(path)
-            if init[1].network != run.training.network:
+            _, config = init
+            if config.network != run.training.network:
                 whose = "the run that begins with it"
                 raise ValueError(f"policy {path} has another network than {whose}")
         run_folder.write_run(folder, run)

@@ -46,19 +46,22 @@ def connected_positions(
 
     Positions lie within plus or minus `half_side_m`. By default the disk graph must be connected;
     `largest_part_at` says who is in the largest connected part under the team's own channel. Robots
-    that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest` only robots
-    outside the largest part are drawn anew, not the whole team: between obstacles hardly any team
-    is connected that is drawn at once. Raises ValueError if all draws were disconnected, or the
-    area has hardly any free space.
+    that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest`, and where
+    the largest part is known, only robots outside it are drawn anew, not the whole team: between
+    obstacles hardly any team is connected that is drawn at once. Raises ValueError if all draws
+    were disconnected, or the area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
     position_m, is_kept = np.empty((num_robots, 2)), np.zeros(num_robots, dtype=np.bool_)
     for _ in range(num_draws):
         _draw_free(position_m, is_kept, half_side_m, rng, is_blocked_at)
-        part = largest_part_at(position_m) if largest_part_at else is_kept
-        if np.all(part) if largest_part_at else is_connected(position_m, range_m):
+        if largest_part_at is None:
+            is_whole = is_connected(position_m, range_m)
+        else:
+            part = largest_part_at(position_m)
+            is_whole, is_kept = bool(np.all(part)), part & keeps_largest
+        if is_whole:
             return position_m
-        is_kept = part & keeps_largest
     reach = f"a range of {range_m:g} m"
     if largest_part_at is not None:
         reach += " in free space, and less in their channel,"

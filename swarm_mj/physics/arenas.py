@@ -20,6 +20,7 @@ from mujoco._structs import MjData, MjModel
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import OPEN, SQUARE_METRES_PER_KM2
 from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
+from swarm_mj.system.decibels import from_db
 from swarm_mj.system.fields import did_you_mean
 
 Arena = Callable[[MjSpec, Mission], None]  # adds the obstacles
@@ -203,7 +204,7 @@ def obstacles_of(model: MjModel) -> Obstacles:
         rotation=rotation,
         size_m=size_m,
         reach_m=np.maximum(model.geom_rbound[found], 0.0),
-        power_left=10.0 ** (-np.array([loss_db_of(model, int(g)) for g in found]) / 10.0),
+        power_left=from_db(-np.array([loss_db_of(model, int(g)) for g in found])),
     )
 
 

@@ -15,8 +15,8 @@ Scene = Callable[[MjSpec, Mission], None]  # changes the arena before it is comp
 
 CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
 ROBOT_MASS_KG = 1.0  # assets/robot.xml
-WALL_THICKNESS_M = 2.0  # half of it, assets/arena.xml
-WALL_HEIGHT_M = 5.0  # half of it, assets/arena.xml
+WALL_HALF_THICKNESS_M = 2.0  # assets/arena.xml
+WALL_HALF_HEIGHT_M = 5.0  # assets/arena.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
 ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
@@ -130,14 +130,15 @@ def _scale_arena(spec: MjSpec, mission: Mission) -> None:
     repeats = mission.side_m * SQUARES_PER_M
     spec.material("floor").texrepeat = [repeats, repeats]
     spec.camera("top").pos = [0.0, 0.0, CAMERA_HEIGHT_PER_SIDE * mission.side_m]
-    centre, across = half + WALL_THICKNESS_M, half + 2 * WALL_THICKNESS_M
+    centre, across = half + WALL_HALF_THICKNESS_M, half + 2 * WALL_HALF_THICKNESS_M
     for name, x, y in (("east", 1, 0), ("west", -1, 0), ("north", 0, 1), ("south", 0, -1)):
         wall = spec.geom(f"wall_{name}")
         if not mission.has_walls:
             spec.delete(wall)
             continue
-        wall.pos = [x * centre, y * centre, WALL_HEIGHT_M]
-        wall.size = [*(WALL_THICKNESS_M if axis else across for axis in (x, y)), WALL_HEIGHT_M]
+        wall.pos = [x * centre, y * centre, WALL_HALF_HEIGHT_M]
+        width, depth = (WALL_HALF_THICKNESS_M if axis else across for axis in (x, y))
+        wall.size = [width, depth, WALL_HALF_HEIGHT_M]
 
 
 def _fit_robot(robot: MjSpec, mission: Mission) -> None:

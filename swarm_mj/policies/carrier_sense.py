@@ -14,9 +14,9 @@ from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.window import DoubleBroadcast, LocalViews
-from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.mission_radio import TrueLinks
 from swarm_mj.system.compiled import compiled
+from swarm_mj.system.decibels import from_db
 
 
 class CarrierSense(RandomTransmission, CentralisedPolicy):

@@ -18,8 +18,8 @@ from jaxtyping import Bool, Float, Float32, Int
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import CentralisedPolicy
-from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW, LocalViews
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, merge_expected, observe_own, rise
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.links import Links, air_of, listen
 from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.radio.reception import NOBODY

@@ -10,11 +10,12 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import BroadcastPolicy
-from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
-from swarm_mj.radio.free_space import from_db
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import PowerLaw, no_powers
 from swarm_mj.radio.spatial_reuse import keep_joined
+from swarm_mj.system.decibels import from_db
 
 
 class Tdma(BroadcastPolicy):

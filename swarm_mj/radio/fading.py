@@ -20,8 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float, Float32
 
-from swarm_mj.radio.free_space import DB_PER_NEPER
 from swarm_mj.system.compiled import compiled
+from swarm_mj.system.decibels import DB_PER_NEPER
 
 NO_LINE_OF_SIGHT = 0.0  # K of Rayleigh fading, linear
 NO_FADING = math.inf  # K without scattered waves, linear

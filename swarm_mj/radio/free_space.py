@@ -15,8 +15,7 @@ from jaxtyping import Float, Int
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.radio.reception import Incoming, add_packet, decoded, received_power
 from swarm_mj.system.compiled import compiled
-
-DB_PER_NEPER = 10.0 / math.log(10.0)  # of a power; of an amplitude or a free-space distance twice
+from swarm_mj.system.decibels import from_db
 
 
 @runtime_checkable
@@ -45,17 +44,13 @@ class VaryingChannel(Protocol):
 
 def path_loss_db(distance_m: float, frequency_hz: float) -> float:
     """Return the free-space path loss over a distance [dB] (Eq. 1)."""
+    # 147.55 is the paper's; 20 log10(c / 4 pi) with the speed of light c is 147.5522.
     return 20.0 * math.log10(distance_m) + 20.0 * math.log10(frequency_hz) - 147.55
 
 
 def channel_gain(loss_db: float) -> float:
     """Return the received over the transmitted power, linear [1] (Eq. 2)."""
     return from_db(-loss_db)
-
-
-def from_db(ratio_db: float) -> float:
-    """Return a ratio in dB as a linear one; a power in dBm as mW."""
-    return 10.0 ** (ratio_db / 10.0)
 
 
 def transmit_power_dbm(

@@ -11,7 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
-from swarm_mj.radio.free_space import DB_PER_NEPER, FreeSpaceRadio
+from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.power_law import FREE_SPACE_EXPONENT, PowerLaw, free_space_law, powers_between
 from swarm_mj.radio.reception import (
     MIN_DISTANCE_M,
@@ -26,6 +26,7 @@ from swarm_mj.radio.reception import (
     transmit,
 )
 from swarm_mj.system.compiled import compiled
+from swarm_mj.system.decibels import DB_PER_NEPER, from_db
 
 NUM_RATIOS = 1024  # steps of x = r / (1 + r), where r is the SINR over the threshold
 MAX_MARGIN_DB = 80.0  # up to which a fade's own distribution is worked out
@@ -221,7 +222,7 @@ def probability_at(curves: Curves, row: int, ratio: float) -> float:
 
 def _fade_exceeds(margin_db: Float[np.ndarray, "M"], rician_k: float) -> Float[np.ndarray, "M"]:
     """Return the probability that a fade leaves more than what a margin can spare."""
-    least = 10.0 ** (-margin_db / 10.0)  # of the mean power
+    least = from_db(-margin_db)  # of the mean power
     if rician_k == NO_FADING:
         return (least <= 1.0).astype(np.float64)
     if rician_k == NO_LINE_OF_SIGHT:

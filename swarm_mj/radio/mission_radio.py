@@ -20,7 +20,6 @@ from swarm_mj.radio.free_space import (
     Channel,
     FreeSpaceRadio,
     VaryingChannel,
-    from_db,
     transmit_power_dbm,
 )
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
@@ -32,6 +31,7 @@ from swarm_mj.radio.power_law import (
     free_space_law,
     two_ray_breakpoint_m,
 )
+from swarm_mj.system.decibels import from_db
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -13,6 +13,7 @@ from swarm_mj.radio.composed import ComposedChannel, strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.replay import palette
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.decibels import to_db
 
 Phases: TypeAlias = Int[np.ndarray, "T 2 N"]  # a robot for each one in both phases of windows
 Positions: TypeAlias = Float[np.ndarray, "T N 2"]  # of all robots in each window [m]
@@ -169,9 +170,9 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     links["is_too_weak"] = is_believed[differs]
     power_mw = np.maximum(true_mw[differs], np.finfo(float).tiny)
     sent_mw = by_robot(mission, radio_of(mission).power_mw)[links["sender"]]
-    links["loss_db"] = np.round(10.0 * np.log10(sent_mw / power_mw))
+    links["loss_db"] = np.round(to_db(sent_mw / power_mw))
     # Rounded down: a packet that does not decode must not show a margin of 0 dB.
-    links["margin_db"] = np.floor(10.0 * np.log10(power_mw / min_mw))
+    links["margin_db"] = np.floor(to_db(power_mw / min_mw))
     num_believed, num_working = (int(np.sum(np.triu(x | x.T))) for x in (is_believed, is_true))
     group = strong_groups(is_true).astype(np.int16)
     return RadioSnapshot(group, links, num_believed, num_working)
@@ -184,7 +185,7 @@ def by_kind(links: LinkRows) -> dict[str, LinkRows]:
 
 def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Lines:
     """Return where links begin and end, by the robots' positions in a window or each one's [m]."""
-    return np.stack([position_m[row, links[end]] for end in NUMBERS[:2]], axis=1)
+    return np.stack([position_m[row, links[end]] for end in ("sender", "receiver")], axis=1)
 
 
 def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:

@@ -89,13 +89,13 @@ def read_footage(path: Path) -> Footage:
         # Teams at rest have no headings, and in free space no robot is cut off.
         none = pa.array(np.zeros(6 * age.size))
         headings = _numbers(columns.get("/scene/heading LineStrips3D:strips", none))
-        headings = headings.reshape(*age.shape, 6)
+        start, end = np.moveaxis(headings.reshape(*age.shape, 2, 3), 2, 0)
         cut_off = _numbers(columns.get("/scene/robots is_cut_off", none[: age.size]))
         return Footage(
             facts=facts,
             window=_windows(columns, "/scene/robots"),
             position_m=position_m,
-            velocity_mps=headings[..., 3:5] - headings[..., :2],
+            velocity_mps=(end - start)[..., :2],
             known_age=age,
             is_cut_off=cut_off.reshape(age.shape) > 0.0,
             mismatch=_mismatch(columns),

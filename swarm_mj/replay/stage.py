@@ -102,8 +102,9 @@ def grid(ground: Ground) -> list[list[tuple[float, float]]]:
 def footprints(obstacles: Obstacles, height_m: float) -> list[Float[np.ndarray, "K 2"]]:
     """Return the outline of each obstacle that reaches this height, once round [m]."""
     outlines = []
-    for kind, centre_m, rotation, size_m in zip(*obstacles[:4], strict=True):
-        points_m = _surface(int(kind), size_m) @ rotation.T + centre_m
+    for n, kind in enumerate(obstacles.kind):
+        rotation, centre_m = obstacles.rotation[n], obstacles.centre_m[n]
+        points_m = _surface(int(kind), obstacles.size_m[n]) @ rotation.T + centre_m
         # The outline is the hull of where lines from the points above to those below pass.
         is_above = points_m[:, 2] > height_m
         above, below = points_m[is_above][:, None], points_m[~is_above][None]

@@ -10,7 +10,8 @@ from swarm_mj.mission.placement import connected_positions
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import team_views
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews, transmit, window
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.window import LocalViews, transmit, window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
 

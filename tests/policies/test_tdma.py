@@ -15,7 +15,8 @@ from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
 

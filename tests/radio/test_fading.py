@@ -16,7 +16,7 @@ from swarm_mj.radio.fading import (
     mixed,
     shadow,
 )
-from swarm_mj.radio.free_space import DB_PER_NEPER
+from swarm_mj.system.decibels import DB_PER_NEPER
 
 NUM = 20_000
 

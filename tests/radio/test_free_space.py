@@ -13,7 +13,6 @@ from hypothesis import strategies as st
 from swarm_mj.radio.free_space import (
     FreeSpaceRadio,
     channel_gain,
-    from_db,
     path_loss_db,
     transmit_power_dbm,
 )
@@ -105,9 +104,6 @@ def test_eq2_gain_by_hand(loss_db, gain):
 
 
 def test_powers_by_hand():
-    assert from_db(-50.0) == pytest.approx(1e-5)
-    assert from_db(30.0) == pytest.approx(1000.0)  # 30 dBm is 1 W
-    assert from_db(1.0) == pytest.approx(1.258925)
     assert transmit_power_dbm(250.0, 2.4e9, -50.0, 1.0) == pytest.approx(POWER_DBM)
     assert transmit_power_dbm(500.0, 2.4e9, -50.0, 1.0) == pytest.approx(POWER_DBM + 6.020600)
     assert transmit_power_dbm(250.0, 2.4e9, -47.0, 4.0) == pytest.approx(POWER_DBM + 6.0)

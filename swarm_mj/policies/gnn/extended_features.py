@@ -14,9 +14,9 @@ from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, log_age, logarithm, remember
 from swarm_mj.protocol.window import LocalViews
-from swarm_mj.radio.free_space import from_db
 from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
 from swarm_mj.system.compiled import compiled
+from swarm_mj.system.decibels import from_db
 
 ADDRESS_RANGES = 1.2  # a teammate believed farther away cannot be addressed [ranges]
 FAR_RANGES = 4.0  # distances count up to here [ranges]

@@ -11,8 +11,13 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
-from swarm_mj.protocol.window import SLOT_WINDOWS, LocalViews
+from swarm_mj.protocol.timestamps import (
+    SLOT_WINDOWS,
+    SLOTS_PER_WINDOW,
+    merge_timestamps,
+    observe_own,
+)
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
@@ -86,7 +91,10 @@ def logarithm(windows: float) -> float:
 
 # Ages are of whole and half windows, so almost all of them are looked up: logarithms were most of
 # the time that these features take.
-LOG_AGES = np.array([math.log1p(n / 2) / math.log1p(LONG_WINDOWS) for n in range(1000)])
+NUM_AGES = round(SLOTS_PER_WINDOW * LONG_WINDOWS)
+LOG_AGES = np.array(
+    [math.log1p(n / SLOTS_PER_WINDOW) / math.log1p(LONG_WINDOWS) for n in range(NUM_AGES)]
+)
 
 
 @compiled()
@@ -98,5 +106,5 @@ def log_age(now: float, then: float, is_granted: bool = False) -> float:
     age = now - then
     if not (then > NEVER or is_granted) or age >= LONG_WINDOWS:
         return 1.0
-    place = int(2.0 * age)
-    return LOG_AGES[place] if place == 2.0 * age and place >= 0 else logarithm(age)
+    place = int(SLOTS_PER_WINDOW * age)
+    return LOG_AGES[place] if place == SLOTS_PER_WINDOW * age and place >= 0 else logarithm(age)

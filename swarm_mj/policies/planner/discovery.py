@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float
 
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import TeamView
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 
 Purpose = Literal["discovery", "search", "plan"]
 

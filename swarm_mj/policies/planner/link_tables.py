@@ -14,6 +14,7 @@ that the sender plans by, and the best of the next.
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -24,6 +25,7 @@ from swarm_mj.policies.planner.snapshots import NUM_SENT, Proposals
 from swarm_mj.protocol.packets import PacketField, bits_for, identity, times
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import Curves, Links, decode_curves, doubtful, probability_at
+from swarm_mj.system.decibels import from_db, to_db
 
 BIN_DB = 2.0
 LEAST_MARGIN_DB = -15.0  # of the lowest bin; packets that are expected to be weaker are not missed
@@ -31,12 +33,21 @@ NUM_BINS = 24
 BIN_CENTRES_DB = LEAST_MARGIN_DB + BIN_DB * np.arange(NUM_BINS)
 
 NOTHING = -1  # in place of the kind of a packet
+MISSED, DECODED = range(2)  # outcomes of a packet
 MAX_KINDS = 64  # that one robot notes
 MAX_TIMES = 255  # that it notes one kind
 
+
+class Law(NamedTuple):
+    """How packets are lost on all links alike."""
+
+    rician_k: float  # of fading
+    loss: float  # share of packets that are lost whatever their power
+
+
 EXCESS_DB = np.arange(-30.0, 18.1, 3.0)  # the values that are distinguished
 ERASURES = (0.0, 0.15, 0.3, 0.45)
-LAWS = tuple((rician_k, loss) for rician_k in (NO_FADING, NO_LINE_OF_SIGHT) for loss in ERASURES)
+LAWS = tuple(Law(rician_k, loss) for rician_k in (NO_FADING, NO_LINE_OF_SIGHT) for loss in ERASURES)
 SPREADS_DB = (3.0, 6.0, 9.0)  # of normal priors of a link's excess
 BLOCKED_SHARES = (0.3, 0.6)  # of priors in which links are as believed, or blocked
 BLOCKED_BELOW_DB = -20.0
@@ -68,7 +79,7 @@ def observe(
     # A sum of its own: the packet that j decoded need not be the strongest by this belief.
     others_mw = np.sum(np.where(everyone[:, None] == i, 0.0, arriving_mw), axis=0)
     margin = prior.received_mw[i, everyone] / (prior.noise_mw + others_mw) / prior.threshold
-    margin_db = 10.0 * np.log10(np.maximum(margin, np.finfo(np.float64).tiny))
+    margin_db = to_db(np.maximum(margin, np.finfo(np.float64).tiny))
     place = np.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5).astype(np.int64)
     is_missed = np.any(arriving_mw > 0.0, axis=0) & (place >= 0)
     kind = (is_decoded * num_robots + i) * NUM_BINS + np.clip(place, 0, NUM_BINS - 1)
@@ -100,7 +111,7 @@ class Evidence:
         times = np.zeros_like(self._times)
         np.add.at(times, (j, kinds[slot, j]), 1)
         by_outcome = times.reshape(num_robots, 2, num_robots, NUM_BINS)
-        return by_outcome[:, 1], by_outcome[:, 0]
+        return by_outcome[:, DECODED], by_outcome[:, MISSED]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,7 +125,7 @@ class LinkTable:
     @cached_property
     def changes_nothing(self) -> bool:
         """True if the plan may stay: losses that affect all links equally favour no other."""
-        fades = LAWS[self.law][0] != NO_FADING
+        fades = LAWS[self.law].rician_k != NO_FADING
         return not (fades or np.any(self.mean_db) or np.any(self.std_db))
 
 
@@ -172,8 +183,8 @@ def corrected(links: Links, table: LinkTable, settings: PlannerSettings) -> Link
     A packet is expected to be weaker than in the mean, and to interfere more: a plan that fails
     costs more than one that is too careful.
     """
-    weaker = 10.0 ** ((table.mean_db - settings.cautious_stds * table.std_db) / 10.0)
-    louder = 10.0 ** ((table.mean_db + settings.disturbing_stds * table.std_db) / 10.0)
+    weaker = from_db(table.mean_db - settings.cautious_stds * table.std_db)
+    louder = from_db(table.mean_db + settings.disturbing_stds * table.std_db)
     links = links._replace(
         received_mw=links.received_mw * weaker,
         interference_mw=links.interference_mw * louder,
@@ -184,7 +195,7 @@ def corrected(links: Links, table: LinkTable, settings: PlannerSettings) -> Link
 def _best(explained: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int, int]:
     """Return the most probable law and prior, at a price for each step from the believed ones."""
     steps = (np.arange(len(LAWS)) > 0).astype(np.float64)
-    steps += [rician_k != NO_FADING for rician_k, _ in LAWS]
+    steps += [law.rician_k != NO_FADING for law in LAWS]
     log_odds = explained - min_log_odds * steps[:, None]
     log_odds[:, 1:] -= min_log_odds
     law, prior = np.unravel_index(np.argmax(log_odds), log_odds.shape)
@@ -193,8 +204,7 @@ def _best(explained: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int
 
 @cache
 def _curves(law: int) -> Curves:
-    rician_k, loss = LAWS[law]
-    return decode_curves(rician_k, 1.0 - loss)
+    return decode_curves(LAWS[law].rician_k, 1.0 - LAWS[law].loss)
 
 
 @cache
@@ -211,7 +221,7 @@ def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, 
 
 def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
     """Return how probably a packet decodes, by each law."""
-    ratios, laws = (10.0 ** (margin_db / 10.0)).tolist(), range(len(LAWS))
+    ratios, laws = from_db(margin_db).tolist(), range(len(LAWS))
     return np.array(
         [[[probability_at(_curves(f), 0, x) for x in row] for f in laws] for row in ratios]
     )

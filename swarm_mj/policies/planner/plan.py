@@ -11,7 +11,7 @@ from swarm_mj.policies.planner.broadcast_scheduler import Problem, schedule_slot
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.radio.links import Links, lone_probabilities
 from swarm_mj.radio.mission_radio import Belief
 

@@ -40,7 +40,8 @@ from swarm_mj.protocol.packets import (
     packet_of,
     slot_bytes,
 )
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 
 

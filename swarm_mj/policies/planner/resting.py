@@ -40,9 +40,11 @@ from swarm_mj.policies.planner.snapshots import snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.tdma import SpatialTdma
 from swarm_mj.protocol.packets import PacketField, fits, packet_of
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.links import Links
 from swarm_mj.radio.mission_radio import Belief, radio_of
+from swarm_mj.system.decibels import from_db
 
 NOT_YET = np.iinfo(np.int64).max
 
@@ -217,5 +219,5 @@ class _Team:
             return _Flight(Plan(prior, self._settings), 0, prior, prior.received_mw)
         table = self._current.table(owner)
         plan = Plan(corrected(prior, table, self._settings), self._settings)
-        expected_mw = prior.received_mw * 10.0 ** (table.mean_db / 10.0)
+        expected_mw = prior.received_mw * from_db(table.mean_db)
         return _Flight(plan, self._current_begin, prior, expected_mw)

@@ -10,6 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.radio.reception import Incoming, add_packet, decoded
+from swarm_mj.radio.spatial_reuse import NOISE
 from swarm_mj.system.compiled import compiled
 
 SLOTS_PER_ROOT = 3.2  # of the number of robots, chosen as the numbers of `Rule`
@@ -37,6 +38,13 @@ class Rule(NamedTuple):
     contention_probability: float = 0.4  # that a robot in need transmits in it [1]
     need_frames: float = 3.0  # a neighbour not heard for longer is lost [frames]
     lost_frames: float = 12.0  # and one not heard for even longer is gone [frames]
+
+
+class Choices(NamedTuple):
+    """Choices that robots made, the earliest first."""
+
+    robot: Int[np.ndarray, "C"]
+    slot: Int[np.ndarray, "C"]  # of the mission, in which it chose
 
 
 def frame_slots(num_robots: int) -> int:
@@ -76,7 +84,7 @@ def switch(frame: Frame, s: int, k: int) -> None:
         for i in range(power.shape[0]):
             if frame.transmits[s, i] and i != j:
                 incoming = add_packet(incoming, i, power[i, j], power[i, j])
-        heard[j] = decoded(incoming, j, 1.0, frame.rule.threshold, factor=frame.rule.interference)
+        heard[j] = decoded(incoming, j, NOISE, frame.rule.threshold, factor=frame.rule.interference)
         if frame.transmits[s, j]:
             heard[j] = j
 
@@ -179,7 +187,7 @@ def chosen(
     announced: Int[np.ndarray, "N"],
     is_known: Bool[np.ndarray, "N"],
     is_marked: Bool[np.ndarray, "F N"],
-    chose: Int[np.ndarray, "predicted 2"],
+    chose: Choices,
     power: Float[np.ndarray, "N N"],
     rule: Rule,
 ) -> int:
@@ -194,9 +202,9 @@ def chosen(
         if is_known[k] or k == i:
             switch(frame, slots[k], k)
     no_marks = np.zeros(is_marked.shape, dtype=np.bool_)
-    for n in range(chose.shape[0]):
-        k, slot = int(chose[n, 0]), int(chose[n, 1])
-        if k != i and is_known[k] and announced[k] < slot:
+    for n in range(len(chose.robot)):
+        k = int(chose.robot[n])
+        if k != i and is_known[k] and announced[k] < chose.slot[n]:
             # Marks are private, so a prediction has to do without those of k.
             switch(frame, slots[k], k)
             slots[k] = best_slot(frame, k, slots[k], rule.min_gain, no_marks)

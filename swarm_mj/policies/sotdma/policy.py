@@ -22,11 +22,12 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.sotdma import slot_table
-from swarm_mj.policies.sotdma.frame import Rule, chosen, first_slots, frame_slots
+from swarm_mj.policies.sotdma.frame import Choices, Rule, chosen, first_slots, frame_slots
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.radio.power_law import powers_between, write_powers
 
@@ -156,11 +157,14 @@ class SotdmaTeam:
         first, after = (-(-(slot % period + n) * len(self._order) // period) for n in (0, 1))
         return self._order[first:after].tolist()
 
-    def _chose_lately(self, slot: int) -> Int[np.ndarray, "predicted 2"]:
+    def _chose_lately(self, slot: int) -> Choices:
         """Return who chose in which slot, the earliest first."""
         lately = range(slot - self._rule.predicted_slots, slot)
-        pairs = [(k, before) for before in lately for k in self._choosers(before)]
-        return np.array(pairs, dtype=np.int64).reshape(-1, 2)
+        choosers = [self._choosers(before) for before in lately]
+        return Choices(
+            robot=np.array([k for each in choosers for k in each], dtype=np.int64),
+            slot=np.repeat(np.array(lately, dtype=np.int64), [len(each) for each in choosers]),
+        )
 
     def _is_in_range(self, position_m: Float[np.ndarray, "N N 2"]) -> Bool[np.ndarray, "N N"]:
         """Return who decodes each robot's lone packets, as it believes."""

@@ -18,6 +18,8 @@ from swarm_mj.system.compiled import compiled
 LONG_AGO = -1_000_000  # before all slots; differences of 32 bits remain exact
 NO_PLACE = -1  # the place of a slot that is left to robots in need
 MAX_MISSED = 100  # that are counted, in 8 bits
+# So that misses are never proof of a collision at once, and so that enough of them are in the end.
+MIN_LOSS, MAX_LOSS = 1e-3, 0.9
 RECENT_WEIGHT = 0.1  # of the last packet in the share that were decoded
 
 
@@ -112,8 +114,8 @@ def marks(table: SlotTable, i: int, slot: int, rule: Rule) -> Bool[np.ndarray, "
 
     Misses in a row that are less probable than the least probability are no chance.
     """
-    loss = max(1.0 - table.outbound_delivery_ratio[i], 1e-3)
-    enough = math.ceil(math.log(rule.min_miss_probability) / math.log(min(loss, 0.9)))
+    loss = min(max(1.0 - table.outbound_delivery_ratio[i], MIN_LOSS), MAX_LOSS)
+    enough = math.ceil(math.log(rule.min_miss_probability) / math.log(loss))
     is_recent = table.missed_at[i] >= slot - rule.marked_slots
     return (table.missed[i] >= max(1, enough)) & is_recent[:, None]
 

@@ -13,7 +13,8 @@ from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner.broadcast_scheduler import Problem, schedule_slot
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import SLOT_WINDOWS, transmit
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.window import transmit
 from swarm_mj.radio.links import KNOWN, Links, links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import radio_of
 

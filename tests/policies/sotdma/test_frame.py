@@ -8,6 +8,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.sotdma.frame import (
+    Choices,
     Rule,
     best_slot,
     chosen,
@@ -109,7 +110,7 @@ def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
 
 EVERYONE = np.ones(NUM_ROBOTS, dtype=bool)
 NO_MARKS = np.zeros((NUM_SLOTS, NUM_ROBOTS), dtype=bool)
-NO_CHOICES = np.zeros((0, 2), dtype=np.int64)
+NO_CHOICES = Choices(robot=np.zeros(0, dtype=np.int64), slot=np.zeros(0, dtype=np.int64))
 
 
 def best(power, slots, k, own, min_gain=RULE.min_gain, is_marked=NO_MARKS):
@@ -141,9 +142,10 @@ def test_a_robot_takes_the_best_slot_beside_where_it_believes_the_others(seed):
     power, rng = team(seed)[1], np.random.default_rng(seed)
     slots, is_marked = rng.integers(0, NUM_SLOTS, NUM_ROBOTS), rng.random(NO_MARKS.shape) < 0.3
     announced = np.array([0, 51, 0, 0, 0, 49, 54, 0, 0])
-    for chose in (NO_CHOICES, np.array([(5, 50), (1, 52), (6, 53), (3, 53)])):
+    four = Choices(robot=np.array([5, 1, 6, 3]), slot=np.array([50, 52, 53, 53]))
+    for chose in (NO_CHOICES, four):
         expected = slots.copy()
-        for k in chose[:2, 0]:
+        for k in chose.robot[:2]:
             expected[k] = best(power, expected, k, expected[k])
         choice = chosen(3, slots, announced, EVERYONE, is_marked, chose, power, RULE)
         assert choice == best(power, expected, 3, slots[3], is_marked=is_marked)

@@ -12,7 +12,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.sotdma.frame import frame_slots
 from swarm_mj.policies.sotdma.policy import SotdmaTeam
 from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, place_of
-from swarm_mj.protocol.window import SLOT_WINDOWS
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
@@ -160,9 +160,9 @@ def test_everyone_chooses_once_in_four_frames_but_not_in_the_first():
     choosers = [i for slot in range(44, 88) for i in team._choosers(slot)]
     assert choosers == ORDER.tolist()
     lately = team._chose_lately(88)
-    assert lately[:, 0].tolist()[-12:] == ORDER.tolist()
-    assert np.all((np.diff(lately[:, 1]) >= 0) & (lately[1:, 1] < 88))
-    assert lately[0, 1] >= 88 - 48
+    assert lately.robot.tolist()[-12:] == ORDER.tolist()
+    assert np.all((np.diff(lately.slot) >= 0) & (lately.slot[1:] < 88))
+    assert lately.slot[0] >= 88 - 48
 
 
 def test_robots_that_believe_the_same_work_out_the_same_first_slots():

@@ -20,7 +20,8 @@ from residual_gnn.rule import Proposal, RestingRule
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy, Parameters
 from swarm_mj.policies.tdma import slot_of
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW, LocalViews
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import Belief
 

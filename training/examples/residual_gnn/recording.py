@@ -11,7 +11,8 @@ from residual_gnn.features import Seen
 from residual_gnn.policy import Decision, ResidualPolicy, ticks
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.protocol.window import SLOT_WINDOWS, SLOTS_PER_WINDOW, LocalViews, channel_at
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.window import LocalViews, channel_at
 from swarm_mj.simulation.swarm import Swarm
 
 LIKELY = 0.02  # above it, a decision that may go otherwise than the rule is always used

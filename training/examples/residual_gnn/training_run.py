@@ -23,7 +23,7 @@ from residual_gnn.rule import RestingRule
 from residual_gnn.torch_network import ResidualNetwork
 from swarm_mj.learning.checkpoint import read_torch
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.window import SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
