@@ -332,6 +332,22 @@ def test_who_transmits_is_told_by_one_truth_value_a_robot(answer, complaint):
         Swarm(small(), [1]).step(Says())
 
 
+@pytest.mark.parametrize("value", [[-1.0, 0.0], [np.nan, 0.0], [0.0], [[0.0, 0.0]]])
+def test_a_cost_is_one_number_of_0_or_more_for_each_mission(value):
+    class Wrong:
+        cost_name, cost_unit = "nothing", "m"
+
+        def __call__(self, _buffers, states):
+            return np.zeros_like(states.velocity_mps)
+
+        def cost(self, _states):
+            return np.array(value)
+
+    swarm = Swarm(paper("stationary", num_robots=3, range_ratio=10.0), [1, 2], controller=Wrong())
+    with pytest.raises(ValueError, match=r"cost must have shape \(2,\), one number of 0 or more"):
+        swarm.step(make_policy("tdma", swarm.mission))
+
+
 def test_a_cost_needs_a_name_and_a_unit():
     class Nameless:
         __call__ = cost = lambda _self, *_: None
