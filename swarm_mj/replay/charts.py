@@ -100,10 +100,11 @@ def draw_states(out: RerunLog) -> None:
     colours = palette.BROADCAST_STATES if facts.is_broadcast else palette.ADDRESSED_STATES
     names = np.array(list(colours))
     state = radio_states(out.log)
-    # Silence is hidden: lanes would otherwise be full of it.
+    # Silence is hidden: lanes would otherwise be full of it. Labels are blank, for they are cut
+    # off where a state lasts a few windows only; the view's name has their colours.
     configuration = rr.StateConfiguration(
         values=names,
-        labels=names,
+        labels=[" "] * len(names),
         visible=names != palette.SILENT,
         colors=np.array(list(colours.values()), dtype=np.uint8),
     )
@@ -164,7 +165,7 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
         named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
         found[f"Share [%]: {named}"] = _mismatch_curves(log)
     cost = log.task_cost
-    if cost is None and log.has_motion:
+    if cost is None and log.facts.mission.task == "flocking":
         variance = log.velocity_variance_m2ps2
         cost = TaskCost(name="velocity variance", unit="m²/s²", value=variance)
     if cost is not None:

@@ -128,14 +128,14 @@ class Footage:
             found[fate] = PacketPaths(packets.row[its], packets.start_m[its], packets.end_m[its])
         return found
 
-    def links(self, row: int) -> LinkRows:
-        """Return the links that are shown in one window: of those too weak, the ego robot's only.
+    def is_own(self, links: LinkRows) -> Bool[np.ndarray, "L"]:
+        """Tell which links are the observer's: in a city, all of them would hide the robots."""
+        return (links["sender"] == self.ego) | (links["receiver"] == self.ego)
 
-        In a city, all of them together would not show which robots each one joins.
-        """
+    def links(self, row: int) -> LinkRows:
+        """Return the observer's links among those compared in one window."""
         links = self.mismatch.at(int(self.window[row]))
-        is_own = (links["sender"] == self.ego) | (links["receiver"] == self.ego)
-        return links[is_own | ~links["is_too_weak"]]
+        return links[self.is_own(links)]
 
     def mismatch_lines(self, row: int) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
         """Return the lines of one window's links [m], and their colours."""

@@ -28,6 +28,9 @@ LAST = 5.1  # the height of the last row, with its texts
 LINE = 1.9  # of a text's second line, which they have beyond free space only
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
+# What robots do with their radios, by `palette.BROADCAST_STATES` and `palette.ADDRESSED_STATES`.
+OF_BROADCASTS = "transmits (blue), hears (dark)"
+OF_ADDRESSED = "delivers (green), is lost (orange), answers (blue), overhears (pink)"
 
 Range: TypeAlias = tuple[float, float]
 
@@ -51,7 +54,9 @@ def layout(log: Log, ground: Ground) -> Layout:
     height = legend_height(log)
     follows = ", follows the team" if ground.moves else ""
     name = f"Map, squares of {square_m(ground):g} m{follows}"
-    map_view = _drawing("/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"])
+    map_view = _drawing(
+        "/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"], **_hidden("arena")
+    )
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
     across, up = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
     tree = _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up)
@@ -65,8 +70,9 @@ def layout(log: Log, ground: Ground) -> Layout:
         column_shares=[11, 10],
         name="Mission",
     )
+    states = OF_BROADCASTS if log.facts.is_broadcast else OF_ADDRESSED
     radio = rrb.Horizontal(
-        rrb.StateTimelineView(origin="/state", name="Radio of every robot"),
+        rrb.StateTimelineView(origin="/state", name=f"Radio of every robot: {states}"),
         rrb.TextDocumentView(origin="/about", name="About this mission"),
         column_shares=[3, 1],
         name="Radio",
@@ -80,10 +86,17 @@ def layout(log: Log, ground: Ground) -> Layout:
     )
 
 
+def _hidden(view: str) -> dict[str, Any]:
+    """Hide the links between others than the observer; the viewer can show them."""
+    unseen = rrb.EntityBehavior(visible=False)
+    return {"overrides": {f"/{view}/world/others/{kind}": unseen for kind in palette.MISMATCH}}
+
+
 def _scene(reach_m: float) -> rrb.Spatial3DView:
     return rrb.Spatial3DView(
         origin="/",
         contents=["/scene/**"],
+        **_hidden("scene"),
         name="Scene in 3-D, colours as on the map",
         background=palette.BACKGROUND,
         line_grid=False,

@@ -42,6 +42,8 @@ CUT_OFF: Colour = (150, 38, 56)
 MEAN_AGE: Colour = (53, 183, 121)
 WORST_AGE: Colour = (150, 158, 172)
 VARIANCE: Colour = (240, 200, 80)
+# The mean age in videos, of one flight and of a second: no colours of the ramp, which mean ages.
+FILM_CURVES: tuple[Colour, Colour] = ((255, 255, 255), (255, 120, 190))
 
 
 def dim(colour: Colour, share: float) -> Colour:

@@ -6,6 +6,7 @@ so that rerun finds it where it looks.
 """
 
 import hashlib
+import itertools
 import shlex
 from pathlib import Path
 
@@ -140,8 +141,8 @@ def _packets(columns: Columns) -> dict[str, PacketPaths]:
 
 def _mismatch(columns: Columns) -> LinkMismatch:
     window, found = NO_MISMATCH.window, [NO_MISMATCH.links]
-    for kind in palette.MISMATCH:
-        entity = f"/scene/world/{kind}"
+    for kind, whose in itertools.product(palette.MISMATCH, ("", "others/")):
+        entity = f"/scene/world/{whose}{kind}"
         if f"{entity} margin_db" in columns:
             window = _windows(columns, entity)
             row = _rows(columns[f"{entity} sender"])

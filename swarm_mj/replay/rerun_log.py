@@ -43,6 +43,8 @@ LAYERS = {
     "arena/radio/range": EntityStyle(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
     "arena/world/unbelieved": EntityStyle(rr.LineStrips2D, None, 0.6, 2.0),
     "arena/world/too_weak": EntityStyle(rr.LineStrips2D, None, 0.5, 2.5),
+    "arena/world/others/unbelieved": EntityStyle(rr.LineStrips2D, None, 0.6, 2.0),
+    "arena/world/others/too_weak": EntityStyle(rr.LineStrips2D, None, 0.5, 2.5),
     "arena/belief/error": EntityStyle(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
     "arena/belief/ring": EntityStyle(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
     "arena/tree": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
@@ -66,6 +68,8 @@ LAYERS = {
     "scene/heading": EntityStyle(rr.LineStrips3D, palette.HEADING, 0.8),
     "scene/world/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
     "scene/world/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
+    "scene/world/others/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
+    "scene/world/others/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
     **{
         f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, style.colour, 1.0)
         for fate, style in palette.PACKETS.items()

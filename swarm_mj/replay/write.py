@@ -185,13 +185,17 @@ def _draw_radio(out: RerunLog) -> None:
 
 def _draw_mismatch(out: RerunLog, radius_m: float, height_m: float) -> None:
     log = out.log
-    for kind, links in by_kind(log.mismatch.links).items():
-        at = log.mismatch.window[links["row"]] - log.window[0]
-        whole_m = ends(links, log.position_m, at)
-        # In 3-D they are whole, whatever their kind: dashes would make the file larger.
-        out.mismatch_lines(f"scene/world/{kind}", links, lifted(whole_m, height_m))
-        each = np.repeat(links, len(PIECES[kind]))
-        out.mismatch_lines(f"arena/world/{kind}", each, divided(whole_m, PIECES[kind]))
+    is_own = log.is_own(log.mismatch.links)
+    # The layout hides those of others: all of a city's would hide the map.
+    for whose, those in {"": is_own, "others/": ~is_own}.items():
+        for kind, links in by_kind(log.mismatch.links[those]).items():
+            at = log.mismatch.window[links["row"]] - log.window[0]
+            whole_m = ends(links, log.position_m, at)
+            # In 3-D they are whole, whatever their kind: dashes would make the file larger.
+            path = f"world/{whose}{kind}"
+            out.mismatch_lines(f"scene/{path}", links, lifted(whole_m, height_m))
+            each = np.repeat(links, len(PIECES[kind]))
+            out.mismatch_lines(f"arena/{path}", each, divided(whole_m, PIECES[kind]))
     row, robot = np.nonzero(log.is_cut_off)
     where_m = log.position_m[row, robot]
     out.layer("arena/world/cut_off", row, positions=where_m)

@@ -25,22 +25,27 @@ EVERYWHERE = {
     "Age of information, all pairs",
     "Age of information [windows]: team ± std (green), r4 (white)",
     "Scene in 3-D, colours as on the map",
-    "Radio of every robot",
     "About this mission",
 }
 OF_ADDRESSED = "Packets in 10 windows: delivered (green), lost (orange), answered (blue)"
 OF_BROADCASTS = "Packets in 10 windows: sent (grey), heard by anyone (blue)"
+RADIO = "Radio of every robot: delivers (green), is lost (orange), answers (blue), overhears (pink)"
+RADIO_OF_BROADCASTS = "Radio of every robot: transmits (blue), hears (dark)"
 OF_FLOCKS = "Velocity variance [m²/s²]"
 OF_WORLDS = "Share [%]: believed, too weak (red); works, unbelieved (green); cut off (white)"
 
 FLIGHTS = {  # by replay: the flight, its legend's texts and the plots beyond those of all
-    "replay": ("two_way", ADDRESSED | ALWAYS | MOVING, {OF_ADDRESSED, OF_FLOCKS}),
-    "flood_replay": ("flooded", BROADCAST | ALWAYS | MOVING, {OF_BROADCASTS, OF_FLOCKS}),
-    "still_replay": ("still", ADDRESSED | ALWAYS, {OF_ADDRESSED}),
+    "replay": ("two_way", ADDRESSED | ALWAYS | MOVING, {OF_ADDRESSED, OF_FLOCKS, RADIO}),
+    "flood_replay": (
+        "flooded",
+        BROADCAST | ALWAYS | MOVING,
+        {OF_BROADCASTS, OF_FLOCKS, RADIO_OF_BROADCASTS},
+    ),
+    "still_replay": ("still", ADDRESSED | ALWAYS, {OF_ADDRESSED, RADIO}),
     "blocked_replay": (
         "blocked",
         BROADCAST | BEYOND | MISMATCH,
-        {OF_BROADCASTS, OF_FLOCKS, OF_WORLDS},
+        {OF_BROADCASTS, OF_WORLDS, RADIO_OF_BROADCASTS},  # it walks at random
     ),
 }
 

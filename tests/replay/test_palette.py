@@ -36,3 +36,9 @@ def test_axes_end_at_round_numbers(value, top):
 
 def test_dim_keeps_the_hue():
     assert palette.dim((200, 100, 50), 0.5) == (100, 50, 25)
+
+
+def test_curves_of_videos_are_no_colours_of_ages():
+    ages = palette.age_colours(np.linspace(0.0, 1.0, 100), 1.0).astype(float)
+    for curve in palette.FILM_CURVES:
+        assert np.min(np.linalg.norm(ages - curve, axis=1)) > 100.0

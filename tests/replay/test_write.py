@@ -169,11 +169,14 @@ def test_the_tree_on_the_map_joins_parents_and_children(replay, two_way):
 
 @pytest.mark.parametrize(("kind", "dashes"), [("too_weak", 4), ("unbelieved", 1)])
 @pytest.mark.parametrize(("view", "axes"), [("arena", 2), ("scene", 3)])
-def test_lines_are_the_mismatched_links(blocked, blocked_replay, kind, dashes, view, axes):
+@pytest.mark.parametrize("whose", ["", "others/"])
+def test_lines_are_the_mismatched_links(blocked, blocked_replay, kind, dashes, view, axes, whose):
+    """Those of the ego robot, r4, are apart from the others'."""
     (window, links), pieces = blocked.log.mismatch, dashes if view == "arena" else 1
-    links = links[links["is_too_weak"] == (kind == "too_weak")]
+    is_own = (links["sender"] == 4) | (links["receiver"] == 4)
+    links = links[(links["is_too_weak"] == (kind == "too_weak")) & (is_own == (whose == ""))]
     start_m = blocked.log.position_m[window[links["row"]] - 1, links["sender"]]
-    entity, component = f"/{view}/world/{kind}", f"LineStrips{axes}D:strips"
+    entity, component = f"/{view}/world/{whose}{kind}", f"LineStrips{axes}D:strips"
     expected = pieces * np.bincount(links["row"], minlength=len(window))
     np.testing.assert_array_equal(counts(blocked_replay, entity, component), expected)
     shown = rows(blocked_replay, entity, component, 2, axes)[::pieces]

@@ -15,7 +15,6 @@ from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import DASHES, WHOLE
 from swarm_mj.replay.palette import Colour, dim
 
-CURVES: tuple[Colour, ...] = (palette.MEAN_AGE, palette.VARIANCE)  # of one flight, and a second
 FAINT = 0.45  # what is still to come, and texts that matter less
 SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
@@ -53,7 +52,7 @@ def draw_title(
     mission, small, large = facts.mission, font(SMALL * size), font(LARGE * size)
     left, right, top = box.left + size // 2, box.right - size // 2, box.top + size // 2
     draw.text((left, top), facts.policy, palette.TEXT, large)
-    draw.text((right, top), f"age {footage.age_mean[row]:.1f}", curve, large, anchor="ra")
+    draw.text((right, top), f"age {footage.age_mean[row]:.1f} windows", curve, large, anchor="ra")
     below = top + 1.7 * size
     what = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
     where = ", ".join(where_flown(mission)).split(", ")
@@ -109,11 +108,12 @@ def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
     if not all(each.facts.is_broadcast for each in footages):
         samples |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
         samples |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
-    is_too_weak = np.concatenate([each.mismatch.links["is_too_weak"] for each in footages])
+    links = [each.mismatch.links[each.is_own(each.mismatch.links)] for each in footages]
+    is_too_weak = np.concatenate(links)["is_too_weak"]
     if np.any(is_too_weak):
         samples[f"{observers}'s link, too weak"] = palette.MISMATCH["too_weak"]
     if not np.all(is_too_weak):
-        samples["works, unbelieved"] = palette.MISMATCH["unbelieved"]
+        samples[f"{observers}'s link, unbelieved"] = palette.MISMATCH["unbelieved"]
     if np.any(is_too_weak):
         samples[SHORTFALL] = palette.TOO_WEAK
     if any(np.any(each.is_cut_off) for each in footages):
@@ -215,13 +215,13 @@ class AgePlot:
         draw.text((inner.left, below), "0", palette.SENT, small)
         draw.text((inner.right, below), f"{self._end_s:g} s", palette.SENT, small, anchor="ra")
         # From the start on: what is still to come sets the axis, which does not change.
-        for curve, colour in zip(self._curves, CURVES, strict=False):
+        for curve, colour in zip(self._curves, palette.FILM_CURVES, strict=False):
             draw.line(curve, dim(colour, FAINT), 1)
 
     def draw_until(self, draw: ImageDraw, rows: Sequence[int]) -> None:
         """Draw the curves so far, and where they are now."""
         radius, width = max(2.0, self._size / 5), max(2, self._size // 8)
-        for curve, colour, row in zip(self._curves, CURVES, rows, strict=False):
+        for curve, colour, row in zip(self._curves, palette.FILM_CURVES, rows, strict=False):
             if row > 0:
                 draw.line(curve[: row + 1], colour, width, joint="curve")
             draw.circle(curve[row], radius, colour)

@@ -18,13 +18,13 @@ from swarm_mj.replay.links import SEGMENTS, arcs, lifted
 
 Shade: TypeAlias = np.ndarray | palette.Colour
 
-ELEVATION_DEG = 55.0  # of the camera above the ground: 90 would look straight down
+# The camera above the ground, by the picture's height over its width: flat in wide pictures and
+# steep in high ones, so that the square fills them. 90 would look straight down.
+SHAPES, ELEVATIONS_DEG = (0.5, 1.0), (45.0, 68.0)
 FOV_Y_DEG = 32.0  # a long lens: what is near is hardly larger than what is far
-SHIFT = 0.15  # of what it looks at, from the square's centre to the south, by half the side
+SHIFTS = 0.21, -0.05  # of what it looks at, from the square's centre south, by half the side
 MARGIN = 0.94  # of the picture, for the square
 TAN = float(np.tan(np.deg2rad(FOV_Y_DEG / 2.0)))
-SIN = np.sin(np.deg2rad(ELEVATION_DEG))
-COS = np.cos(np.deg2rad(ELEVATION_DEG))
 
 # Sizes on the picture, of its height, whatever the size of the area.
 ROBOT, OBSERVER = 0.0085, 0.0115  # radii
@@ -47,21 +47,32 @@ class Camera(NamedTuple):
     height: int
 
     @property
+    def elevation_deg(self) -> float:
+        """The angle at which the camera looks down."""
+        return float(np.interp(self.height / self.width, SHAPES, ELEVATIONS_DEG))
+
+    @property
     def pixel_m(self) -> float:
         """The ground that a pixel in the middle of the picture shows, across [m]."""
         return 2.0 * self.distance_m * TAN / self.height
 
     def pixels(self, point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "K 2"]:
         """Return points' places in the picture: right and down from its upper left corner."""
-        across, up, ahead = _axes(point_m - np.append(self.target_m, 0.0))
+        across, up, ahead = self.axes(point_m - np.append(self.target_m, 0.0))
         scale = self.height / (2.0 * TAN * (self.distance_m + ahead))
         return np.stack([self.width / 2 + across * scale, self.height / 2 - up * scale], axis=1)
+
+    def axes(self, point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "3 K"]:
+        """Return points along the picture's axes from the target: right, up and ahead [m]."""
+        x, y, z = point_m.T
+        sin, cos = (of(np.deg2rad(self.elevation_deg)) for of in (np.sin, np.cos))
+        return np.stack([x, sin * y + cos * z, cos * y - sin * z])
 
     def aim(self, free: MjvCamera) -> None:
         """Let a camera of MuJoCo's see the same."""
         free.type = mjtCamera.mjCAMERA_FREE.value
         free.lookat[:] = (*self.target_m, 0.0)
-        free.distance, free.azimuth, free.elevation = self.distance_m, 90.0, -ELEVATION_DEG
+        free.distance, free.azimuth, free.elevation = self.distance_m, 90.0, -self.elevation_deg
 
 
 def look_at(ground: Ground, row: int, width: int, height: int) -> Camera:
@@ -69,16 +80,12 @@ def look_at(ground: Ground, row: int, width: int, height: int) -> Camera:
     reach_m = ground.reach_m
     corners = reach_m * np.array([[x, y, 0.0] for x in (-1.0, 1.0) for y in (-1.0, 1.0)])
     # The near edge is seen under a wider angle than the far one: the target moves towards it.
-    south_m = np.array([0.0, SHIFT * reach_m])
-    across, up, ahead = _axes(corners + np.append(south_m, 0.0))
+    shift = float(np.interp(height / width, SHAPES, SHIFTS))
+    south_m = np.array([0.0, shift * reach_m])
+    camera = Camera(ground.centre_m[row] - south_m, 0.0, width, height)
+    across, up, ahead = camera.axes(corners + np.append(south_m, 0.0))
     needed = np.maximum(np.abs(across) * height / width, np.abs(up)) / (MARGIN * TAN) - ahead
-    return Camera(ground.centre_m[row] - south_m, float(np.max(needed)), width, height)
-
-
-def _axes(point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "3 K"]:
-    # Along the picture's axes from the target: right, up and ahead.
-    x, y, z = point_m.T
-    return np.stack([x, SIN * y + COS * z, COS * y - SIN * z])
+    return camera._replace(distance_m=float(np.max(needed)))
 
 
 def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) -> None:

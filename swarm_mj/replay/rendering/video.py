@@ -19,7 +19,6 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rendering.drawing import (
-    CURVES,
     AgePlot,
     Box,
     draw_legend,
@@ -31,7 +30,7 @@ from swarm_mj.replay.view import DEFAULTS, GIF, MAX_MISSIONS, VideoStyle, fitted
 
 Picture = UInt8[np.ndarray, "H W 3"]
 
-STRIP = 0.22  # of the height, below the scenes
+STRIPS = 0.22, 0.28  # of the height, below one scene, and below two, which are narrow
 TEXT = 0.028  # of the height, or of the width of a narrow scene
 SEAM = 4  # between scenes [pixels]
 LEGEND = 0.32  # of the width; the plot has the rest
@@ -57,7 +56,7 @@ class Movie(ExitStack):
             replace(each, facts=replace(each.facts, full_scale=scale)) for each in footages
         ]
         self._num_frames, width, height = style.num_frames, style.width, style.height
-        bottom = height - round(STRIP * height)
+        bottom = height - round(STRIPS[len(footages) - 1] * height)
         edges = np.linspace(0, width, len(footages) + 1).round().astype(int).tolist()
         self._boxes = [Box(left, 0, right, bottom) for left, right in itertools.pairwise(edges)]
         self._text = max(9, round(min(TEXT * height, 0.05 * self._boxes[0].right)))
@@ -92,7 +91,9 @@ class Movie(ExitStack):
         """Return the picture of these windows, one of each mission, from 0."""
         picture = self._empty.copy()
         draw = ImageDraw.Draw(picture)
-        parts = zip(self._footages, rows, self._boxes, self._renderers, CURVES, strict=False)
+        parts = zip(
+            self._footages, rows, self._boxes, self._renderers, palette.FILM_CURVES, strict=False
+        )
         for footage, row, box, renderer, curve in parts:
             picture.paste(Image.fromarray(renderer.frame(footage, row)), (box.left, box.top))
             draw_title(draw, footage, row, box, self._text, curve)

@@ -45,7 +45,7 @@ def test_a_constant_age_is_a_line_at_its_height():
     heights = []
     for age in (10.0, 5.0, 0.001):
         picture = drawn(AgePlot([footage([age] * 5 + [10.0])], BOX, 10).draw_until, [4])
-        rows, _ = np.nonzero(has(picture, palette.MEAN_AGE, 40))
+        rows, _ = np.nonzero(has(picture, palette.FILM_CURVES[0], 40))
         heights.append(np.median(rows))
     top, middle, bottom = heights
     assert top < middle < bottom

@@ -78,6 +78,15 @@ def test_the_whole_square_is_seen_and_fills_the_picture(width, height):
     assert 0.8 < extent.max() < 1.0
 
 
+@pytest.mark.parametrize(("height", "axis"), [(560, 0), (1250, 1)])
+def test_the_camera_is_flat_in_wide_pictures_and_steep_in_high_ones(height, axis):
+    """From one angle for all, a wide one had empty sides and a high one an empty quarter."""
+    camera = look_at(Ground(centre_m=np.zeros((1, 2)), reach_m=100.0), 0, 1280, height)
+    corners = np.array([[x, y, 0.0] for x in (-100.0, 100.0) for y in (-100.0, 100.0)])
+    extent = np.ptp(camera.pixels(corners), axis=0)
+    assert extent[axis] / (1280, height)[axis] > 0.72
+
+
 def test_the_target_is_in_the_middle_north_is_up_and_a_pixel_as_large_as_the_lens_says():
     camera = look_at(Ground(centre_m=np.zeros((1, 2)), reach_m=100.0), 0, 640, 480)
     middle = np.append(camera.target_m, 0.0)

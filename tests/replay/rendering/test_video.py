@@ -15,7 +15,7 @@ from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_
 from swarm_mj.replay.view import VideoStyle
 
 with_opengl = pytest.mark.usefixtures("opengl")
-MEAN_AGE = np.array(palette.MEAN_AGE, dtype=int)
+MEAN_AGE = np.array(palette.FILM_CURVES[0], dtype=int)
 STYLE = VideoStyle(width=480, height=320, seconds=1.0, fps=6)
 
 
