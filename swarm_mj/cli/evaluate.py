@@ -58,6 +58,9 @@ class EvaluateOptions(PolicyOptions):
         metavar="FILE.png|.svg|.pdf",
         is_common=True,
     )
+    wide: bool = output_option(
+        False, "print more columns: quantiles, bytes, published values", is_common=True
+    )
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)
     resume: bool = output_option(False, "continue where an interruption broke off")
@@ -127,7 +130,7 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
             write_csv(options.csv, results)
         if kept:
             kept.unlink()
-    print_results(results)
+    print_results(results, is_wide=options.wide)
     if options.plot:
         _plot(options.plot, results)
     return DONE

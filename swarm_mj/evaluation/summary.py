@@ -15,6 +15,7 @@ from swarm_mj.evaluation.published import published
 from swarm_mj.evaluation.results import COLUMNS, Result
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
+from swarm_mj.mission.presets import radio_in_words
 from swarm_mj.policies.registry import flown_name
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.writing import write_json
@@ -94,7 +95,7 @@ def _result(
         **{name: value for name, value in asdict(regime).items() if name in COLUMNS},
         **study.components.names,
         "policy": policy,
-        "radio": regime.beyond_free_space or None,
+        "radio": radio_in_words(regime) or None,
         "episodes": study.episodes,
         "seed": study.seed,
         "probability": study.parameters[regime, policy].get("probability"),

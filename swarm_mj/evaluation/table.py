@@ -1,7 +1,7 @@
 """Results on the terminal: one table per regime, the lowest age first."""
 
 import io
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from functools import partial
 from itertools import groupby
 
@@ -19,15 +19,20 @@ NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the tabl
 NONE = "-"
 
 
-def results_text(results: Sequence[Result]) -> str:
+def results_text(results: Sequence[Result], *, is_wide: bool = False) -> str:
     """Return the tables of `print_results` as plain text, for any terminal."""
     file = io.StringIO()
-    print_results(results, file)
+    print_results(results, file, is_wide=is_wide)
     return file.getvalue().rstrip()
 
 
-def print_results(results: Sequence[Result], file: io.StringIO | None = None) -> None:
-    """Print a table per regime, whose results stand together; plain text into a file."""
+def print_results(
+    results: Sequence[Result], file: io.StringIO | None = None, *, is_wide: bool = False
+) -> None:
+    """Print a table per regime, whose results stand together; plain text into a file.
+
+    It has the age, its difference to the baseline's and the share heard; a wide one has all.
+    """
     is_terminal = None if file is None else False
     open_console = partial(
         Console,
@@ -44,11 +49,11 @@ def print_results(results: Sequence[Result], file: io.StringIO | None = None) ->
     for regime, group in groupby(results, missions_of):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
-        wide.print(_table(of_regime))
-        for line in _below(of_regime):
+        wide.print(_table(of_regime, _cells if is_wide else _brief_cells))
+        for line in _below(of_regime, is_wide=is_wide):
             console.print(line)
         console.print()
-    console.print(" ".join(_legend(results)))
+    console.print(" ".join(_legend(results, is_wide=is_wide)))
 
 
 def missions_of(result: Result) -> str:
@@ -74,16 +79,31 @@ def missions_of(result: Result) -> str:
     )
 
 
-def _table(results: Sequence[Result]) -> Table:
-    table = Table(box=SIMPLE_HEAD, show_edge=False, padding=0)
+def _table(results: Sequence[Result], cells_of: Callable[[Result], dict[str, str]]) -> Table:
+    gap = 0 if cells_of is _cells else (0, 1)
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=gap)
     table.add_column("policy", no_wrap=True)
-    rows = [_cells(result) for result in results]
+    rows = [cells_of(result) for result in results]
     headings = list(rows[0])
     for heading in headings:
         table.add_column(heading, justify="right")
     for result, cells in zip(results, rows, strict=True):
         table.add_row(_name(result), *(cells.get(heading, NONE) for heading in headings))
     return table
+
+
+def _brief_cells(result: Result) -> dict[str, str]:
+    """Return the cells that most people read, in one line."""
+    heard = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
+    own_cost = {}
+    if _has_own_cost(result):
+        own_cost["task cost ± SEM"] = _plus_minus(result.task_cost_mean, result.task_cost_sem)
+    return {
+        "AoI ± SEM": _plus_minus(result.aoi_mean, result.aoi_sem),
+        f"minus {result.baseline}'s [95 %]": " ".join(_difference(result, "aoi").split("\n")),
+        **own_cost,
+        "heard": _number(heard, ".0%"),
+    }
 
 
 def _cells(result: Result) -> dict[str, str]:
@@ -147,42 +167,50 @@ def _name(result: Result) -> str:
     return f"{name}\n  + {result.payload}" if carries_more(result) else name
 
 
-def _below(results: Sequence[Result]) -> Iterator[str]:
+def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
     sent = [
         f"{result.policy} {BITS_PER_BYTE * result.bytes_per_second / 1000.0:,.1f}"
         for result in results
         if result.bytes_per_second is not None
     ]
-    if sent:
+    if sent and is_wide:
         yield f"sent by the team [kbit/s]: {', '.join(sent)}"
     # A flock's course depends on its policy, so each policy may have a bound of its own.
     bounds = [result.aoi_floor_mean for result in results if result.aoi_floor_mean is not None]
-    if bounds:
-        low, high = f"{min(bounds):.2f}", f"{max(bounds):.2f}"
+    low, high = f"{min(bounds, default=0):.2f}", f"{max(bounds, default=0):.2f}"
+    if float(high) > 0.0:  # or it says nothing
         shown = low if low == high else f"{low} to {high}, by policy"
         yield f"lower bound (connectivity): {shown}"
 
 
-def _legend(results: Sequence[Result]) -> Iterator[str]:
+def _legend(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
     """Yield the meanings of the columns, a sentence each."""
     first = results[0]
     yield (
         "AoI: age of information, how old a robot's news of another is [windows]; mean over "
-        f"{first.episodes} missions from seed {first.seed}, standard error and 95 % interval. "
-        "Median and p95 are over missions. "
-        f"Difference: AoI minus that of {first.baseline}, mission by mission. "
-        "Packets: sent in a window, and the share that reached its addressee or, of broadcasts, "
-        "at least one robot; hearers: robots that decoded a broadcast, on average. "
-        "Bytes: of a packet."
+        f"{first.episodes} missions from seed {first.seed},"
     )
+    if is_wide:
+        yield (
+            "standard error and 95 % interval. Median and p95 are over missions. "
+            f"Difference: AoI minus that of {first.baseline}, mission by mission. "
+            "Packets: sent in a window, and the share that reached its addressee or, of "
+            "broadcasts, at least one robot; hearers: robots that decoded a broadcast, on average. "
+            "Bytes: of a packet."
+        )
+    else:
+        yield (
+            "with its standard error. Differences are mission by mission, with 95 % intervals. "
+            "Heard: packets that reached their addressee or, of broadcasts, at least one robot."
+        )
     costs = [f"{r.task_cost_name} [{r.task_cost_unit}]" for r in results if _has_own_cost(r)]
     for cost in dict.fromkeys(costs):
         yield f"Task cost: {cost}, mean over windows ± standard error over missions."
-    if any(result.task == "flocking" for result in results):
+    if is_wide and any(result.task == "flocking" for result in results):
         yield "Velocity variance (var.): of the robots' velocities [m²/s²]."
-    if any(result.published_aoi_mean is not None for result in results):
+    if is_wide and any(result.published_aoi_mean is not None for result in results):
         yield "Published: by the paper."
-    if any(result.aoi_floor_mean is not None for result in results):
+    if any(_number(result.aoi_floor_mean) not in (NONE, "0.00") for result in results):
         yield "Lower bound: the AoI if all robots with a path between them shared everything at"
         yield "once."
     if any(map(carries_more, results)):

@@ -6,6 +6,7 @@ from functools import partial
 from typing import Any
 
 from swarm_mj.mission.specification import OPEN, Mission, Task
+from swarm_mj.system.fields import as_typed
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:
@@ -86,14 +87,24 @@ PAPERS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": refere
 PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 
 
+def radio_in_words(mission: Mission) -> str:
+    """Return what differs from the paper's radio, in words; empty if nothing does."""
+    numbers = ("sinr_threshold_db", "noise_dbm", "sensing_dbm")
+    other = {
+        n: getattr(mission, n) for n in numbers if getattr(mission, n) != getattr(Mission(), n)
+    }
+    words = [f"{name} {as_typed(value)}" for name, value in other.items()]
+    return ", ".join(filter(None, (mission.beyond_free_space, *words)))
+
+
 def where_flown(mission: Mission) -> list[str]:
     """Return arena and channel in words: a world by its preset, and what differs from it."""
-    is_world, radio = mission.preset in WORLDS, mission.beyond_free_space
+    is_world, radio = mission.preset in WORLDS, radio_in_words(mission)
     usual = PRESETS[mission.preset]() if is_world else Mission()
     where = [f"preset {mission.preset}"] if is_world else []
     if mission.arena != usual.arena:
         where.append(f"arena {mission.arena}")
-    if radio != usual.beyond_free_space:
+    if radio != radio_in_words(usual):
         where.append(radio or "free space")
     return where
 

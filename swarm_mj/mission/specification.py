@@ -106,8 +106,12 @@ class Mission:
         500, "number of windows", "windows", 1.0, 100_000.0, "length, in windows of 100 ms"
     )
     # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
-    sinr_threshold_db: float = _number(1.0, "SINR threshold", "dB", -30.0, 60.0)
-    noise_dbm: float = _number(-50.0, "noise power", "dBm", -200.0, 50.0)
+    sinr_threshold_db: float = _number(
+        1.0, "SINR threshold", "dB", -30.0, 60.0, "least SINR that decodes", group=CHANNEL
+    )
+    noise_dbm: float = _number(
+        -50.0, "noise power", "dBm", -200.0, 50.0, "transmit power follows it", group=CHANNEL
+    )
     sensing_dbm: float = _radio(
         -57.0, "sensing threshold", "dBm", -200.0, 50.0, "from where on csma finds its channel busy"
     )

@@ -33,9 +33,9 @@ LARGEST |= {"aoi_difference_ci_low": -222.222, "aoi_difference_ci_high": -111.11
 def printed(capsys, monkeypatch):
     """What is printed on a console of so many columns."""
 
-    def lines(results, columns):
+    def lines(results, columns, *, is_wide=True):
         monkeypatch.setenv("COLUMNS", str(columns))
-        print_results(results)
+        print_results(results, is_wide=is_wide)
         return capsys.readouterr().out.splitlines()
 
     return lines
@@ -52,6 +52,24 @@ def test_the_largest_numbers_are_whole_at_100_columns(printed, columns):
     assert "…" not in text
     for number in ("123.46 ± 12.35", "100.00, 222.22", "-222.22, -111.11", "115.73 ± 12.35"):
         assert number in text
+
+
+def test_the_table_has_what_most_people_read_unless_it_is_wide(printed):
+    first = {"baseline": "b", **NOTHING, "aoi_sem": 0.5, "delivery_ratio": 0.25, "episodes": 9}
+    other = {
+        "aoi_difference_mean": 1.5,
+        "aoi_difference_ci_low": 1.0,
+        "aoi_difference_ci_high": 2.0,
+    }
+    results = [some_result("a", 3.5, **first | other), some_result("b", 2.0, **first)]
+    lines = printed(results, 80, is_wide=False)
+    heading, _, *table = lines[[line[:6] for line in lines].index("policy") :]
+    assert heading.split() == ["policy", "AoI", "±", "SEM", "minus", "b's", "[95", "%]", "heard"]
+    assert table[0].split() == ["b", "2.00", "±", "0.50", "-", "25%"]
+    assert table[1].split() == ["a", "3.50", "±", "0.50", "1.50", "1.00,", "2.00", "25%"]
+    assert max(map(len, lines)) <= 80
+    for rare in ("median", "Bytes", "Published", "kbit/s"):
+        assert rare not in "\n".join(lines)
 
 
 def test_a_long_name_widens_the_table_and_cuts_no_number(printed):
@@ -128,8 +146,9 @@ def test_the_lower_bound_stands_below(printed):
     lines = printed([some_result("a", 1.0), some_result("b", 2.0, aoi_floor_mean=1.75)], 100)
     assert "lower bound (connectivity): 1.00 to 1.75, by policy" in lines
     assert "lower bound (connectivity): 1.00" in printed([some_result("a", 1.0)], 100)
-    unknown = "\n".join(printed([some_result("a", 1.0, aoi_floor_mean=None)], 100))
-    assert "ower bound" not in unknown
+    for nothing in (None, 0.0, 0.004):  # none, or one that says nothing
+        unknown = "\n".join(printed([some_result("a", 1.0, aoi_floor_mean=nothing)], 100))
+        assert "ower bound" not in unknown
     assert "variance" not in unknown  # which depends on the policy in flocks alone
 
 
