@@ -33,6 +33,8 @@ BLOCK_M = 110.0  # side of a city block; the rest of the pitch is street
 ROOM_M = 170.0  # side of a room
 DOOR_M = 25.0  # width of the door in the middle of every wall between two rooms
 WALL_M = 1.0  # thickness of these walls
+NOT_FINITE = ("nan", "inf", "infinity")
+MAX_REPLICAS = 10_000  # of a <replicate>; more would be compiled for minutes
 NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
 TREES_PER_KM2 = 100.0
 TREE_RADIUS_M = 6.0
@@ -134,15 +136,29 @@ def _read(file: str) -> MjSpec:
     try:
         for element in ElementTree.parse(file).iter():
             for name, value in element.attrib.items():
-                if name not in NAMING and "nan" in value.lower().split():
+                words = [] if name in NAMING else value.lower().split()
+                if wrong := [word for word in words if word.lstrip("+-") in NOT_FINITE]:
                     named = element.get("name", "without a name")
-                    raise ValueError(f"{element.tag} {named} has a nan in {name}")
+                    a = "an" if wrong[0] == "inf" else "a"
+                    raise ValueError(f"{element.tag} {named} has {a} {wrong[0]} in {name}")
+            _check_element(element, Path(file).parent)
         return MjSpec.from_file(file)
     except ElementTree.ParseError as error:
         line, said = error.position[0], str(error).partition(":")[0]
         raise ValueError(f"arena {file}, line {line}: not well-formed XML ({said})") from error
     except ValueError as error:
         raise _refused(file, error) from error
+
+
+def _check_element(element: ElementTree.Element, folder: Path) -> None:
+    """Raise ValueError for what MuJoCo would read or compile without an end: pipes, replicas."""
+    count = element.get("count", "")
+    if element.tag == "replicate" and count.isdigit() and int(count) > MAX_REPLICAS:
+        raise ValueError(f"replicate has a count of {count}; {MAX_REPLICAS} are allowed")
+    name = element.get("file")
+    # A compiler's meshdir may lead elsewhere, but pipes are no regular content of any folder.
+    if name and (path := folder / name).exists() and not path.is_file():
+        raise ValueError(f"{element.tag} {name} is a folder, a pipe or a device; name a file")
 
 
 def _refused(file: str, error: ValueError) -> ValueError:
@@ -198,6 +214,11 @@ def obstacles_of(model: MjModel) -> Obstacles:
         middle_m, half_m = np.split(model.geom_aabb[found[o]], 2)
         centre_m[o] += rotation[o] @ middle_m
         kind[o], size_m[o] = BOX, half_m
+    is_finite = np.isfinite(np.column_stack([centre_m, size_m])).all(axis=1)
+    if not np.all(is_finite):
+        g = int(found[np.argmin(is_finite)])
+        named = model.geom(g).name or f"number {g}"
+        raise ValueError(f"geom {named} is of infinite size, or infinitely far; give it numbers")
     return Obstacles(
         kind=kind.astype(np.int64),
         centre_m=centre_m,

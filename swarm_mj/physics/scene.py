@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 
+import numpy as np
 from mujoco._enums import mjtDisableBit
 from mujoco._specs import MjsGeom, MjSpec
 
@@ -23,6 +24,16 @@ ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
+# What a scene must leave: of joints, of actuators, and of MuJoCo's options.
+MOVING = (
+    *("axis", "damping", "stiffness", "frictionloss", "armature", "range", "limited", "ref"),
+    *("springref", "actfrclimited", "solref_limit", "solimp_limit", "actgravcomp", "margin"),
+    *("gear", "gainprm", "biasprm", "gaintype", "biastype", "dyntype", "dynprm"),
+    *("ctrlrange", "forcerange", "ctrllimited", "forcelimited"),
+    *("integrator", "solver", "cone", "jacobian", "enableflags", "disableactuator"),
+    *("iterations", "tolerance", "ls_iterations", "ls_tolerance", "impratio"),
+    *("gravity", "wind", "density", "viscosity"),
+)
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 
@@ -75,15 +86,20 @@ def compose(
 
 
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
-    """Let a scene change the arena, but neither the robots' joints nor the time step."""
-    before = _movable(spec)
+    """Let a scene change the arena, but neither the robots' joints nor how MuJoCo steps."""
+    before, motion, flags = _movable(spec), _motion(spec), spec.option.disableflags
     scene(spec, mission)
     if _movable(spec) != before:
         raise ValueError(
             "a scene may add bodies, geoms and sites, but no joints or actuators, and must leave "
             "the robots' own"
         )
-    spec.option.timestep = timestep_s(mission)
+    for name, value in _motion(spec).items():
+        if value != motion[name]:
+            raise ValueError(
+                f"a scene must leave how robots move, but changed {name}; add geoms instead"
+            )
+    spec.option.timestep, spec.option.disableflags = timestep_s(mission), flags
     if mission.physics == "exact":
         spec.option.disableflags |= int(mjtDisableBit.mjDSBL_CONTACT)
         return
@@ -106,6 +122,20 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 def _movable(spec: MjSpec) -> list[str]:
     """Return the names of joints and actuators, in MuJoCo's order."""
     return [part.name for part in (*spec.joints, *spec.actuators)]
+
+
+def _motion(spec: MjSpec) -> dict[str, str]:
+    """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
+    parts = [
+        *((part.name, part) for part in (*spec.joints, *spec.actuators)),
+        ("option", spec.option),
+    ]
+    return {
+        f"{name} of {owner}": str(np.asarray(value).tolist())  # in which nan is nan
+        for owner, part in parts
+        for name in MOVING
+        if (value := getattr(part, name, None)) is not None
+    }
 
 
 def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:

@@ -196,7 +196,7 @@ def test_existing_results_need_force(succeed, refusal, tmp_path, output):
     assert "--force" in refusal(*arguments)
     assert path.read_text() == "precious"
     done = succeed(*arguments, "--force")
-    assert "lower bound (connectivity)" in done.stdout
+    assert "AoI ± SEM" in done.stdout
     assert files(tmp_path) == [f"out/r.{output}"]
     if output == "csv":
         assert [result.aoi_sem for result in read_results(path)] == [None] * 4

@@ -1,5 +1,6 @@
 """Shipped arenas grow with the team; which geoms of a scene are obstacles, and what they cost."""
 
+import os
 import re
 from dataclasses import replace
 from itertools import combinations, groupby
@@ -211,3 +212,32 @@ def test_a_mesh_is_the_box_around_it():
     assert found.kind.tolist() == [BOX]
     np.testing.assert_allclose(off.min(axis=0), -found.size_m[0], atol=1e-6)
     np.testing.assert_allclose(off.max(axis=0), found.size_m[0], atol=1e-6)
+
+
+BOXES = '<mujoco><worldbody>{}<geom type="box" size="9 9 9" group="1"/></worldbody></mujoco>'
+
+
+@pytest.mark.parametrize(
+    ("inside", "said"),
+    [
+        ('<geom type="box" size="1 9 9" pos="inf 0 5" group="1"/>', "has an inf in pos"),
+        ('<geom type="box" size="-infinity 9 9" group="1"/>', "has a -infinity in size"),
+        ('<replicate count="100000"><geom size="1"/></replicate>', "10000 are allowed"),
+        ('<include file="pipe"/>', "include pipe is a folder, a pipe or a device"),
+    ],
+)
+def test_files_without_an_end_are_refused_at_once(tmp_path, inside, said):
+    os.mkfifo(tmp_path / "pipe")
+    path = tmp_path / "arena.xml"
+    path.write_text(BOXES.format(inside))
+    with pytest.raises(ValueError, match=said):
+        Swarm(paper("stationary", num_robots=3, arena=str(path)), [1])
+
+
+def test_a_scene_s_infinite_obstacles_are_refused():
+    def endless(spec, _mission):
+        box = mujoco.mjtGeom.mjGEOM_BOX
+        spec.worldbody.add_geom(type=box, size=[1, 9, 9], pos=[np.inf, 0, 5], group=1)
+
+    with pytest.raises(ValueError, match="infinite"):
+        Swarm(paper("stationary", num_robots=3), [1], scene=endless)

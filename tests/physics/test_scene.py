@@ -164,3 +164,32 @@ def test_robots_that_collide_come_no_farther_in_a_step_than_a_radius_together():
         mission = paper("random-walk", collide=True, velocity_ratio=velocity_ratio)
         assert num_substeps(mission) == slowest
         assert 2.0 * mission.max_velocity_mps * timestep_s(mission) <= ROBOT_RADIUS_M + 1e-9
+
+
+@pytest.mark.parametrize(
+    ("part", "name", "value"),
+    [
+        ("joint", "damping", [5.0, 0.0, 0.0]),
+        ("joint", "frictionloss", 1.0),
+        ("actuator", "forcerange", [-1.0, 1.0]),
+        ("option", "integrator", mujoco.mjtIntegrator.mjINT_RK4),
+        ("option", "gravity", [1.0, 0.0, 0.0]),
+    ],
+)
+def test_a_scene_that_changes_how_robots_move_is_refused(part, name, value):
+    def meddling(spec, _mission):
+        owner = {"joint": spec.joints[0], "actuator": spec.actuators[0], "option": spec.option}
+        old = np.asarray(getattr(owner[part], name))
+        setattr(owner[part], name, np.reshape(value, old.shape) if old.ndim else value)
+
+    with pytest.raises(ValueError, match=f"must leave how robots move, but changed {name} of"):
+        compose(paper("random-walk", num_robots=3, physics="contact"), scene=meddling)
+
+
+def test_a_scene_cannot_switch_the_solver_s_parts_off():
+    def without_limits(spec, _mission):
+        spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)
+
+    mission = paper("random-walk", num_robots=3, physics="contact")
+    spec = compose(mission, scene=without_limits)
+    assert not spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT
