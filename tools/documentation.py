@@ -20,7 +20,7 @@ from swarm_mj.system.fields import as_typed, range_of
 
 ROOT = Path(__file__).parent.parent
 PAGES = {  # where they are on the site, and in the repository
-    "index.md": "README.md",
+    "overview.md": "README.md",
     "changelog.md": "CHANGELOG.md",
     "contributing.md": "CONTRIBUTING.md",
 }

@@ -64,8 +64,9 @@ def test_every_page_loads_files_of_the_site_only(built):
 
 
 @pytest.mark.slow
-def test_the_home_is_the_readme_and_pictures_come_along(built):
-    home = (built / "index.html").read_text(encoding="utf-8")
+def test_the_home_has_three_cards_and_the_overview_is_the_readme(built):
+    assert (built / "index.html").read_text(encoding="utf-8").count('class="card"') == 3
+    home = (built / "overview.html").read_text(encoding="utf-8")
     assert (ROOT / "README.md").read_text(encoding="utf-8").startswith("# swarm_mj")
     assert "age of information" in home
     assert (built / "repository/assets/figures/paper/fig5.png").stat().st_size > 10_000
@@ -98,7 +99,7 @@ def test_links_between_files_become_links_of_the_site():
     assert linked == text.replace("docs/", "").replace("(assets", "(repository/assets")
     assert targets == {"assets/figures/learning.png"}
     linked, targets = site_links("[a](../README.md) [b](code.md)", "docs/x.md", "x.md")
-    assert (linked, targets) == ("[a](index.md) [b](code.md)", set())
+    assert (linked, targets) == ("[a](overview.md) [b](code.md)", set())
 
 
 def test_a_link_to_nothing_is_an_error():
