@@ -67,7 +67,7 @@ def draw_flight(
             least = max(float(np.min(variance)), MIN_SHARE * float(np.max(variance)))
             axes[1].set_ylim(bottom=least / 2.0)
         axes[-1].set_xlabel(f"window of {window_s:g} s")
-    return _kept(figure)
+    return kept(figure)
 
 
 def draw_evaluation(results: Sequence[Result]) -> Figure:
@@ -89,7 +89,7 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
             part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
             _draw_policies(part, sorted(shown, key=lambda result: result.aoi_mean))
         figure.supxlabel(_origin(results), x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
-    return _kept(figure)
+    return kept(figure)
 
 
 def _lines(said: str) -> list[str]:
@@ -155,7 +155,8 @@ def _axes(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes
     return figure, list(axes.flat)
 
 
-def _kept(figure: Figure) -> Figure:
+def kept(figure: Figure) -> Figure:
+    """Return a figure as a function hands it back, in a notebook too."""
     # A notebook shows a figure twice if it is open and a cell's result.
     if "inline" in str(plt.get_backend()):
         plt.close(figure)

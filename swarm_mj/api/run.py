@@ -164,6 +164,20 @@ class Run:
         policy, window_s = self.config["policy"], self.mission.window_s
         return draw_flight(self.columns(), self.title, policy, window_s, self.task_cost)
 
+    def picture(self, window: int | None = None) -> "Figure":
+        """Draw a map of one window, for a slide: robots by age, trails, packets, obstacles.
+
+        It is the last window unless given; 1 is the first. Colours are those of the replay.
+
+        Raises:
+            ValueError: There is no such window, or nothing was recorded.
+        """
+        footage = self.footage()
+        need("matplotlib", "a picture")
+        from swarm_mj.api.picture import draw_picture
+
+        return draw_picture(footage, window)
+
     def show(self) -> None:
         """Play the flight as a video, in a notebook; elsewhere, say how to see it.
 

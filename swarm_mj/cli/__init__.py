@@ -30,7 +30,7 @@ COMMANDS = {  # each is a module here: `fly` holds its options, `FlyOptions`, an
     "evaluate": "Fly policies over the same missions and say where they stand.",
     "train": "Train a communication policy by PPO.",
     "figures": "Draw the paper's figures from results.",
-    "replay": "Open a replay in rerun's viewer, or make a video of it.",
+    "replay": "Open a replay in rerun's viewer, or make a video or a picture of it.",
     "scene": "Write the scene of a mission as one MJCF file.",
     "doctor": "Say what works on this machine, and how to mend what does not.",
     "bench": "Time the simulation and its parts.",

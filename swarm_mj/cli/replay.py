@@ -1,4 +1,4 @@
-"""`swarm-mj replay`: opens recorded missions, or makes a video of them."""
+"""`swarm-mj replay`: opens recorded missions, or makes a video or a picture of them."""
 
 import re
 import shlex
@@ -15,17 +15,17 @@ from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.terminal import WorkBar, plain_console, quiet_matplotlib
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 if TYPE_CHECKING:
     from swarm_mj.replay.footage import Footage
 
-VIDEO = "video"  # a heading of the help
+VIDEO, PICTURE = "video", "picture"  # headings of the help
 _video = partial(setting, group=VIDEO)
 OWN_TIME = f"the mission's own time, {view.LONGEST_S:g} at most"
 BARE = "the bare arena"
-SUFFIXES = ".mp4|.gif"
+SUFFIXES, PICTURES = ".mp4|.gif", ".png|.svg|.pdf"
 PIXELS = (160, 3840)  # of a side
 
 
@@ -44,6 +44,15 @@ class ReplayOptions:
         "make a video instead, of one mission or of two side by side: FILE.mp4 or FILE.gif",
         group=VIDEO,
     )
+    picture: Path | None = setting(
+        None,
+        "draw the map of one window instead, for a slide",
+        metavar="FILE.png|.svg|.pdf",
+        group=PICTURE,
+    )
+    window: int | None = setting(
+        None, "which window; 1 is the first", low=1, high=10**9, shown="the last", group=PICTURE
+    )
     size: str | None = _video(
         None, "in pixels", metavar="WIDTHxHEIGHT", shown="1280x720; GIF: 830x520"
     )
@@ -54,20 +63,22 @@ class ReplayOptions:
         None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
     )
     scene: str | None = _video(
-        None, "the scene of your own that the mission was flown in", metavar=SHOWN_AS, shown=BARE
+        None,
+        "the scene of your own that the mission was flown in; of a picture, too",
+        metavar=SHOWN_AS,
+        shown=BARE,
     )
-    force: bool = _video(False, "replace an existing video")
+    force: bool = _video(False, "replace an existing video or picture")
     yes: bool = _video(False, YES)
 
 
 def run(options: ReplayOptions) -> int:
     """Run the command; return its exit code."""
+    _check_together(options)
     if options.video is not None:
         return _make_video(options, options.video)
-    if options.size or options.seconds or options.fps or options.force or options.scene:
-        raise ValueError(
-            "--size, --seconds, --fps, --scene and --force are of videos; name one by --video"
-        )
+    if options.picture is not None:
+        return _draw_picture(options, options.picture)
     from swarm_mj.replay.read import check_replay  # rerun is slow to import
 
     for file in options.file:
@@ -79,9 +90,42 @@ def run(options: ReplayOptions) -> int:
     return run_viewer(command)
 
 
+def _check_together(options: ReplayOptions) -> None:
+    """Raise ValueError for options that have no use together, or no use alone."""
+    ways = {"--web": options.web, "--video": options.video, "--picture": options.picture}
+    if len(named := [way for way, value in ways.items() if value]) > 1:
+        raise ValueError(f"{named[0]} is not allowed with {named[1]}; leave one out")
+    if not options.video and (options.size or options.seconds or options.fps):
+        raise ValueError("--size, --seconds and --fps are of videos; name one by --video")
+    if not options.picture and options.window:
+        raise ValueError("--window is of pictures; name one by --picture")
+    if not (options.video or options.picture) and (options.force or options.scene):
+        raise ValueError(
+            "--scene and --force are of videos and pictures; name one by --video or --picture"
+        )
+
+
+def _draw_picture(options: ReplayOptions, picture: Path) -> int:
+    file, *others = options.file
+    if others:
+        raise ValueError(f"a picture shows 1 replay, not {len(options.file)}; name one")
+    is_new = not options.force
+    check_outputs(Output("picture", picture, PICTURES), inputs=options.file, must_be_new=is_new)
+    for module in ("matplotlib", "rerun"):
+        need(module, "a picture")
+    quiet_matplotlib()
+    with Console(stderr=True, highlight=False).status("Drawing ..."):
+        from swarm_mj.api.picture import draw_picture
+        from swarm_mj.evaluation.figures.style import save
+        from swarm_mj.replay.read import read_footage
+
+        footage = _in_scene(read_footage(file), options.scene)
+        save(draw_picture(footage, options.window), picture)
+    plain_console().print(f"Wrote {shlex.quote(str(picture))}")
+    return 0
+
+
 def _make_video(options: ReplayOptions, video: Path) -> int:
-    if options.web:
-        raise ValueError("--web is not allowed with --video; leave one out")
     if len(options.file) > view.MAX_MISSIONS:
         raise ValueError(f"a video shows 1 or {view.MAX_MISSIONS} replays, not {len(options.file)}")
     check_outputs(
@@ -134,6 +178,6 @@ def _in_scene(footage: "Footage", scene: str | None) -> "Footage":
         return replace(footage, **Components(scene=scene).made(footage.facts.mission).given)
     if flown_in is not None:
         hint = "; --scene shows it, too." if is_own(flown_in) else "."
-        text = f"The video shows {BARE}. The mission was flown in the scene {flown_in!r}"
+        text = f"It shows {BARE}. The mission was flown in the scene {flown_in!r}"
         plain_console(is_error=True).print(text + hint)
     return footage

@@ -75,6 +75,12 @@ def test_two_missions_make_one_gif(flown, here):
         ("--video a.mp4 --size 161x160", "size of an MP4 must be even"),
         ("--video a.mp4 --web", "--web is not allowed with --video"),
         ("--seconds 5", "are of videos; name one by --video"),
+        ("--picture a.png --video a.mp4", "--video is not allowed with --picture"),
+        ("--picture a.jpg", "picture must be named *.png or *.svg or *.pdf, not a.jpg"),
+        ("--picture a.png --size 320x200", "are of videos; name one by --video"),
+        ("--window 3", "--window is of pictures; name one by --picture"),
+        ("--force", "--scene and --force are of videos and pictures"),
+        ("--picture a.png --window 999", "window must be from 1 to "),
         ("--video a.mp4 --fps 0", "fps"),
         ("--video a.gif --fps 51", "fps of a GIF must be at most 50, not 51"),
         (
@@ -89,6 +95,17 @@ def test_bad_input_is_one_clear_line(tdma, here, capsys, arguments, complaint):
     assert complaint in said
     assert len(said.strip().splitlines()) == 1
     assert list(here.iterdir()) == []
+
+
+def test_a_picture_of_one_window_needs_no_opengl(tdma, here, monkeypatch, capsys):
+    monkeypatch.setenv("MUJOCO_GL", "off")
+    for name, magic in (("a.svg", b"<?xml"), ("b.png", b"\x89PNG")):
+        assert main(["replay", tdma, "--picture", name, "--window", "2"]) == 0
+        assert (here / name).read_bytes().startswith(magic)
+        assert capsys.readouterr().out == f"Wrote {name}\n"
+    assert b"<!-- tdma -->" in (here / "a.svg").read_bytes()
+    assert main(["replay", tdma, "--picture", "a.svg"]) == 2
+    assert "a.svg exists" in capsys.readouterr().err
 
 
 def test_an_interrupt_or_a_lack_of_opengl_leaves_nothing(tdma, here, monkeypatch, capsys):

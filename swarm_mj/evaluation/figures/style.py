@@ -99,5 +99,6 @@ def save(figure: Figure, path: Path) -> None:
     drawn = io.BytesIO()
     with styled():
         metadata = {field: cast(Text, caption).get_text(), **undated}
-        figure.savefig(drawn, format=kind, metadata=metadata)
+        colour = figure.get_facecolor()
+        figure.savefig(drawn, format=kind, facecolor=colour, metadata=metadata)
     write_bytes(path, drawn.getbuffer())

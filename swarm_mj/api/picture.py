@@ -1,0 +1,273 @@
+"""A still map of one window, for a slide: robots by age, their trails, and packets on the way."""
+
+import textwrap
+from typing import Any
+
+import matplotlib.pyplot as plt
+import numpy as np
+from jaxtyping import Float
+from matplotlib.axes import Axes
+from matplotlib.collections import LineCollection
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
+from matplotlib.patches import Polygon, Rectangle
+
+from swarm_mj.api.charts import kept
+from swarm_mj.evaluation.figures.style import CAPTION, escape_mathtext, styled
+from swarm_mj.mission.presets import where_flown
+from swarm_mj.physics.arenas import obstacles_of
+from swarm_mj.physics.scene import compose
+from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.replay import palette
+from swarm_mj.replay.footage import Footage, frame
+from swarm_mj.system.packages import need, version
+
+WIDTH_IN, HEIGHT_IN, DPI = 12.8, 7.2, 150  # 1920 by 1080 pixels
+MAP_IN, LEFT_IN, BOTTOM_IN = 6.3, 0.85, 0.6  # the map's side, and where it stands
+TEXT_IN, RAMP_IN = 7.75, 4.4  # where what is written begins, and how long the ramp of ages is
+MARGIN = 1.04  # of the map, around what it must show
+TRAIL_WINDOWS, PIECES = 300, 15  # of a trail, and how many shades it fades in
+FAINTEST, BRIGHTEST = 0.08, 0.75  # of a trail's ends
+SMALLEST_PT, LARGEST_PT, CROWD_PT = 6.5, 13.0, 75.0  # a robot's size: the last by the root of N
+LARGE_PT, TEXT_PT, SMALL_PT = 22.0, 13.0, 10.5
+LINE = 1.45  # of a line's height, by the size of its type
+CHARACTERS = 52  # of a line
+POINTS_PER_IN = 72.0
+FATES = {"heard": "packet heard"}  # in words, where the fate's name does not say it
+
+Colour = tuple[float, float, float]
+
+
+def draw_picture(footage: Footage, window: int | None = None) -> Figure:
+    """Return a map of one window, 16 by 9; the last unless given, 1 is a mission's first.
+
+    Raises:
+        ValueError: There is no such window.
+        ModuleNotFoundError: The mission has obstacles, and rerun is not installed.
+    """
+    row = _row(footage, window)
+    with styled():
+        figure = plt.figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI)
+        figure.set_facecolor(_rgb(palette.BACKGROUND))
+        sides = LEFT_IN / WIDTH_IN, BOTTOM_IN / HEIGHT_IN, MAP_IN / WIDTH_IN, MAP_IN / HEIGHT_IN
+        axes = figure.add_axes(sides)
+        radius_m = _frame(axes, footage, row)
+        shown = _draw_ground(axes, footage)
+        if footage.has_motion:
+            shown.append(_draw_trails(axes, footage, row))
+        shown += _draw_robots(axes, footage, row)
+        shown += _draw_packets(axes, footage, row, radius_m)
+        below_in = _write(figure, footage, row)
+        _draw_ramp(figure, footage, below_in)
+        _draw_legend(figure, shown, below_in - 0.75)
+    return kept(figure)
+
+
+def _row(footage: Footage, window: int | None) -> int:
+    windows = footage.window.tolist()
+    if window is not None and window not in windows:
+        raise ValueError(f"window must be from {windows[0]} to {windows[-1]}, not {window}")
+    return len(windows) - 1 if window is None else windows.index(window)
+
+
+def _rgb(colour: palette.Colour) -> Colour:
+    red, green, blue = colour
+    return red / 255.0, green / 255.0, blue / 255.0
+
+
+def _size_pt(footage: Footage) -> float:
+    size = CROWD_PT / np.sqrt(footage.facts.mission.num_robots)
+    return float(np.clip(size, SMALLEST_PT, LARGEST_PT))
+
+
+def _trails(footage: Footage, row: int) -> Float[np.ndarray, "P N 2"]:
+    """Return where the robots were in the last windows, the oldest first [m]."""
+    return footage.position_m[max(0, row - TRAIL_WINDOWS) : row + 1]
+
+
+def _frame(axes: Axes, footage: Footage, row: int) -> float:
+    """Set the map's limits around area, robots and trails; return a robot's radius on it [m]."""
+    mission, trails_m = footage.facts.mission, _trails(footage, row)
+    if not footage.has_motion:
+        trails_m = trails_m[-1:]
+    ground = frame(trails_m.reshape(1, -1, 2), mission.half_side_m)
+    (x, y), reach_m = ground.centre_m[0], MARGIN * ground.reach_m
+    axes.set(xlim=(x - reach_m, x + reach_m), ylim=(y - reach_m, y + reach_m), aspect="equal")
+    axes.set_facecolor(_rgb(palette.BACKGROUND))
+    axes.grid(color=_rgb(palette.GRID), linewidth=0.8)
+    axes.set_xlabel("x [m]", fontsize=TEXT_PT, color=_rgb(palette.SENT))
+    axes.set_ylabel("y [m]", fontsize=TEXT_PT, color=_rgb(palette.SENT))
+    faint = _rgb(palette.WALL)
+    axes.tick_params(colors=faint, labelcolor=_rgb(palette.SENT), labelsize=SMALL_PT)
+    axes.spines[:].set(visible=True, color=_rgb(palette.OUTLINE))
+    return reach_m * _size_pt(footage) / (POINTS_PER_IN * MAP_IN)
+
+
+def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
+    """Draw area and obstacles; return samples for the legend."""
+    mission = footage.facts.mission
+    half_m, style = mission.half_side_m, "-" if mission.has_walls else "--"
+    line: dict[str, Any] = {
+        "edgecolor": _rgb(palette.WALL),
+        "linestyle": style,
+        "linewidth": 1.2,
+        "zorder": 1.0,
+    }
+    axes.add_patch(Rectangle((-half_m, -half_m), 2 * half_m, 2 * half_m, fill=False, **line))
+    wall: dict[str, Any] = {"color": _rgb(palette.WALL), "linestyle": style, "linewidth": 1.2}
+    shown = [Line2D([], [], label="wall of the area" if mission.has_walls else "area", **wall)]
+    obstacles = obstacles_of(compose(mission, scene=footage.scene).compile())
+    if len(obstacles.kind) > 0:
+        need("rerun", "a picture with obstacles")
+        from swarm_mj.replay.stage import footprints
+
+        fill: dict[str, Any] = {"facecolor": _rgb(palette.OUTLINE), "edgecolor": _rgb(palette.WALL)}
+        for outline_m in footprints(obstacles, ROBOT_HEIGHT_M):
+            axes.add_patch(Polygon(outline_m, linewidth=0.8, zorder=1.5, **fill))
+        shown.append(_dot("obstacle", palette.OUTLINE, "s", palette.WALL))
+    return shown
+
+
+def _draw_trails(axes: Axes, footage: Footage, row: int) -> Line2D:
+    trails_m = _trails(footage, row)
+    edges = np.linspace(0, len(trails_m) - 1, PIECES + 1).round().astype(int)
+    colours = footage.colours[row] / 255.0
+    for k, alpha in enumerate(np.linspace(FAINTEST, BRIGHTEST, PIECES)):
+        piece_m = trails_m[edges[k] : edges[k + 1] + 1].swapaxes(0, 1)
+        if piece_m.shape[1] > 1:
+            style: dict[str, Any] = {
+                "colors": colours,
+                "alpha": alpha,
+                "linewidth": 1.6,
+                "zorder": 2.0,
+            }
+            axes.add_collection(LineCollection(list(piece_m), **style), autolim=False)
+    seconds = (len(trails_m) - 1) * footage.facts.mission.window_s
+    label = f"trail of the last {seconds:g} s"
+    return Line2D([], [], color=_rgb(palette.SENT), alpha=BRIGHTEST, linewidth=1.6, label=label)
+
+
+def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
+    """Draw the robots over all but packets; return samples of what the ramp does not show."""
+    x, y = footage.position_m[row].T
+    size = _size_pt(footage) ** 2
+    off = footage.is_cut_off[row]
+    if np.any(off):
+        axes.scatter(x[off], y[off], s=3.2 * size, color=_rgb(palette.CUT_OFF), zorder=3.0)
+    edge = _rgb(palette.BACKGROUND)
+    style: dict[str, Any] = {"edgecolors": [edge], "linewidths": 0.8, "zorder": 4.0}
+    axes.scatter(x, y, s=size, c=footage.colours[row] / 255.0, **style)
+    own = footage.ego
+    axes.annotate(
+        f"r{own}",
+        (x[own], y[own]),
+        (0.7 * _size_pt(footage), 0.7 * _size_pt(footage)),
+        textcoords="offset points",
+        color=_rgb(palette.EGO),
+        fontsize=TEXT_PT,
+        fontweight="bold",
+        zorder=6.0,
+    )
+    shown = [_dot(f"r{own}, whose knowledge is shown", palette.EGO)]
+    if np.any(np.isnan(footage.known_age[row]) & footage.is_on[row]):
+        shown.append(_dot("never heard of", palette.UNKNOWN))
+    if not np.all(footage.is_on[row]):
+        shown.append(_dot("failed", palette.SWITCHED_OFF))
+    if np.any(off):
+        shown.append(_dot(f"halo: cut off from r{own} now", palette.CUT_OFF))
+    return shown
+
+
+def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> list[Line2D]:
+    """Draw an arrow for each packet that was on the way, a lost one half-way; return samples."""
+    shown = []
+    for fate, packets in footage.packets_at(row).items():
+        way_m = palette.PACKETS[fate].share * (packets.end_m - packets.start_m)
+        span_m = np.linalg.norm(way_m, axis=1, keepdims=True)
+        far = span_m[:, 0] > 2.0 * radius_m
+        if not np.any(far):
+            continue
+        # From rim to rim, so that no robot hides an arrow's head.
+        rim_m = radius_m * way_m[far] / span_m[far]
+        start_m, along_m = packets.start_m[far] + rim_m, way_m[far] - 2.0 * rim_m
+        colour = _rgb(palette.PACKETS[fate].colour)
+        how: dict[str, Any] = {
+            "angles": "xy",
+            "scale_units": "xy",
+            "scale": 1.0,
+            "width": 0.0028,
+            "headwidth": 4.5,
+        }
+        x, y, along_x, along_y = np.hstack([start_m, along_m]).T
+        axes.quiver(x, y, along_x, along_y, color=colour, zorder=5.0, alpha=0.9, **how)
+        name = FATES.get(fate, f"packet {fate}")
+        shown.append(Line2D([], [], color=colour, marker=">", markevery=[1], label=name))
+    return shown
+
+
+def _dot(
+    label: str, colour: palette.Colour, marker: str = "o", edge: palette.Colour | None = None
+) -> Line2D:
+    look: dict[str, Any] = {
+        "markerfacecolor": _rgb(colour),
+        "markeredgecolor": _rgb(edge or colour),
+    }
+    return Line2D([], [], linestyle="", marker=marker, markersize=9.0, label=label, **look)
+
+
+def _write(figure: Figure, footage: Footage, row: int) -> float:
+    """Write title and time beside the map; return how high the last line stands [in]."""
+    facts, mission = footage.facts, footage.facts.mission
+    where = [*where_flown(mission), *facts.own_parts]
+    about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
+    now = footage.window[row]
+    lines = [(facts.policy or "a mission", LARGE_PT, palette.TEXT)]
+    lines += [(each, TEXT_PT, palette.TEXT) for each in textwrap.wrap(about, CHARACTERS)]
+    said = textwrap.wrap(", ".join(where), CHARACTERS, break_on_hyphens=False)
+    lines += [(each, SMALL_PT, palette.SENT) for each in said]
+    time = f"{now * mission.window_s:.1f} s, window {now} of {mission.num_windows}"
+    lines.append((time, TEXT_PT, palette.TEXT))
+    if np.isfinite(footage.age_mean[row]):
+        age = f"mean age of information: {footage.age_mean[row]:.1f} windows"
+        lines.append((age, TEXT_PT, palette.MEAN_AGE))
+    y_in = HEIGHT_IN - 0.3
+    for text, size, colour in lines:
+        y_in -= LINE * size / POINTS_PER_IN
+        x, y = TEXT_IN / WIDTH_IN, y_in / HEIGHT_IN
+        figure.text(x, y, escape_mathtext(text), fontsize=size, color=_rgb(colour))
+    caption = f"swarm_mj {version()}"
+    x, y = TEXT_IN / WIDTH_IN, BOTTOM_IN / HEIGHT_IN
+    figure.text(x, y, caption, fontsize=8.0, color=_rgb(palette.WALL), gid=CAPTION)
+    return y_in
+
+
+def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
+    full = footage.facts.full_scale
+    place = TEXT_IN / WIDTH_IN, (below_in - 0.75) / HEIGHT_IN, RAMP_IN / WIDTH_IN, 0.2 / HEIGHT_IN
+    axes = figure.add_axes(place)
+    ages = np.linspace(0.0, full, 256)
+    axes.imshow(palette.age_colours(ages, full)[None], aspect="auto", extent=(0.0, full, 0.0, 1.0))
+    axes.set_title(
+        f"age of what r{footage.ego} knows of a robot [windows]",
+        fontsize=TEXT_PT,
+        color=_rgb(palette.TEXT),
+    )
+    axes.set_xticks([0.0, full / 2.0, full], ["0", f"{full / 2.0:g}", f"{full:g} or more"])
+    axes.tick_params(colors=_rgb(palette.WALL), labelcolor=_rgb(palette.SENT), labelsize=SMALL_PT)
+    axes.set_yticks([])
+    axes.grid(visible=False)
+    axes.spines[:].set_visible(False)
+
+
+def _draw_legend(figure: Figure, shown: list[Line2D], below_in: float) -> None:
+    figure.legend(
+        handles=shown,
+        loc="upper left",
+        bbox_to_anchor=((TEXT_IN - 0.05) / WIDTH_IN, (below_in - 0.4) / HEIGHT_IN),
+        frameon=False,
+        fontsize=TEXT_PT,
+        labelcolor=_rgb(palette.SENT),
+        borderpad=0.0,
+        borderaxespad=0.0,
+        labelspacing=0.6,
+    )
