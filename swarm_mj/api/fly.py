@@ -24,7 +24,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder
+from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observer
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system import needs
@@ -91,6 +91,7 @@ def fly(
         KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
     """
     mission = mission_of(fly, task, mission_fields)
+    check_observer(observer, mission.num_robots)
     how = {"probability": probability, "is_deterministic": is_deterministic}
     how |= {"features": (features,) if isinstance(features, str) else tuple(features)}
     chosen, name = _policy_of(policy, mission, how)

@@ -9,6 +9,7 @@ hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is
 import argparse
 import importlib
 import os
+import signal
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
@@ -19,7 +20,7 @@ from swarm_mj.cli.options import Parser, parse_options
 from swarm_mj.mission.components import one_line_each
 from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import did_you_mean
-from swarm_mj.system.interrupt import interruptible
+from swarm_mj.system.interrupt import INTERRUPTS, interruptible
 from swarm_mj.system.streams import lasting_streams
 
 NAME = "swarm-mj"
@@ -78,6 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
 def end_process() -> NoReturn:
     """Run this process's command line as `main` does, and end the process with its exit code."""
     code = main()
+    for number in INTERRUPTS:  # the work is over: what comes now changes neither it nor the code
+        signal.signal(number, signal.SIG_IGN)
     if code == INTERRUPTED:
         # Compiled code that was broken off while it loaded may crash when Python unloads its
         # libraries one by one, so an interrupted process ends at once.

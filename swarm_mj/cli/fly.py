@@ -18,7 +18,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.replay.recorder import Recorder
+from swarm_mj.replay.recorder import Recorder, check_observer
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.simulation.swarm import Swarm
@@ -71,6 +71,7 @@ def run(options: FlyOptions) -> int:
     mission = options.mission
     (asked,) = registry.with_payload([options.policy], options.payload)
     name = registry.flown_name(asked, mission)
+    check_observer(options.observer, mission.num_robots)
     options = replace(options, policy=name)
     path = _replay_path(options)
     _check_machine(options, path)

@@ -52,6 +52,9 @@ class Parser(argparse.ArgumentParser):
 
     def known(self, arguments: Sequence[str]) -> argparse.Namespace:
         """Return the values typed; refuse an unknown flag and name the likely one."""
+        for argument in arguments:
+            if argument.startswith("-") and argument.endswith("=--"):  # argparse drops the dashes
+                self.error(f"argument {argument.partition('=')[0]}: expected a value, not '--'")
         parsed, left = self.parse_known_args(arguments)
         if left:
             flags = [flag for action in self._actions for flag in action.option_strings]

@@ -13,6 +13,7 @@ from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay import view
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.system.fields import setting
+from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import WorkBar, plain_console, quiet_matplotlib
@@ -145,6 +146,7 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     style = replace(style, seconds=options.seconds or view.default_seconds(footages))
     with WorkBar("Rendering", style.num_frames, "pictures") as bar:
         content = make_video(footages, suffix, style, bar.advance)
+    raise_if_interrupted()  # an encoder may have swallowed it
     write_bytes(video, content)
     number, name = style.num_frames, shlex.quote(str(video))
     plain_console().print(

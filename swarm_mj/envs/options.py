@@ -14,6 +14,7 @@ from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission, make_mission
 from swarm_mj.mission.components import Components
+from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
 from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
@@ -63,6 +64,7 @@ def make_batch(
     components = Components(channel=channel, controller=controller, scene=scene)
     # Copies: a component may draw or remember, and another environment may be given the same one.
     components = copy.deepcopy(components.made(mission))
+    arena_of(mission)  # refuses one that is not there
     _check_reward(reward, mission, components.controller)
     _load_named(features)
     return MissionBatch(

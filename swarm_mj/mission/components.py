@@ -151,7 +151,7 @@ def make(kind: str, name: str, mission: Mission) -> object:
         if any(is_needed):
             return found(mission)
         return found(mission=mission) if "mission" in takes else found()
-    except Exception as error:
+    except (Exception, SystemExit) as error:
         said = _in_a_line(error, name.partition(":")[0])
         raise ValueError(f"{kind} {name} raised {said}") from error
 
@@ -169,14 +169,16 @@ def one_line_each() -> Iterator[None]:
         yield
     except (KeyboardInterrupt, MemoryError):
         raise
-    except Exception as error:
-        frames = traceback.walk_tb(error.__traceback__)
+    except (Exception, SystemExit) as error:
+        # What stops a generator comes out of it as another error, whose cause has the frames.
+        causes = [each for each in (error, error.__cause__) if each is not None]
+        frames = [each for cause in causes for each in traceback.walk_tb(cause.__traceback__)]
         modules = [frame.f_globals.get("__name__", "") for frame, _ in frames]
         theirs = [module for module in modules if module in _loaded]
         if not theirs:
             raise
         innermost = theirs[-1]  # as it raised
-        said = f"{_loaded[innermost]} raised {_in_a_line(error, innermost)}"
+        said = f"{_loaded[innermost]} raised {_in_a_line(causes[-1], innermost)}"
         raise ValueError(said) from error
 
 

@@ -213,6 +213,8 @@ class Mission:
 
     def __post_init__(self) -> None:
         check(self)
+        if not isinstance(self.arena, str):
+            raise ValueError(f"arena must be a name, not {self.arena!r:.80}")
         object.__setattr__(self, "prior_knowledge", in_order(self.prior_knowledge))
         if self.grants(NOTHING) and self.prior_knowledge != NOTHING:
             some = ", ".join(get_args(Grant))

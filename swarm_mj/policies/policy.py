@@ -53,6 +53,16 @@ class Policy:
         """Prepare for new missions: N robots in each, and one generator per mission."""
 
 
+def check_parameters(policy: Policy) -> None:
+    """Raise ValueError for a parameter that a file of results could not hold."""
+    for name, value in policy.parameters.items():
+        if value is not None and type(value) not in (bool, int, float, str):
+            raise ValueError(
+                f"parameter {name} of {type(policy).__name__} must be a plain number, a text, True "
+                f"or False, not {value!r:.80} of the type {type(value).__name__}; convert it"
+            )
+
+
 class DecentralisedPolicy(Policy, ABC):
     """A policy that every robot evaluates on its own view (Eq. 9)."""
 

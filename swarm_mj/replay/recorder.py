@@ -92,14 +92,20 @@ class Log(Footage):
         return self.is_other_known & (self.parent != NO_PARENT)
 
 
+def check_observer(observer: int, num_robots: int) -> None:
+    """Raise ValueError unless there is this robot, whose knowledge a replay shows."""
+    is_whole = isinstance(observer, Integral) and not isinstance(observer, bool)
+    if not is_whole or not 0 <= observer < num_robots:
+        raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {observer!r}")
+
+
 class Recorder:
     """Copies what a replay shows from one of a swarm's missions, window by window."""
 
     def __init__(self, swarm: Swarm, *, ego: int = 0, index: int = 0) -> None:
         """Prepare the record of what the ego robot knows; raise ValueError if there is none."""
         num_robots = swarm.mission.num_robots
-        if not isinstance(ego, Integral) or not 0 <= ego < num_robots:
-            raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {ego!r}")
+        check_observer(ego, num_robots)
         matrices_bytes = AGE_BYTES * num_robots**2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._radio_stride = stride_of(swarm, self._stride)

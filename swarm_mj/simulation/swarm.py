@@ -16,18 +16,23 @@ from swarm_mj.mission.placement import connected_positions, draw_survivors
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.physics.worlds import Physics
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.policy import (
+    CentralisedPolicy,
+    DecentralisedPolicy,
+    Policy,
+    check_parameters,
+)
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
-from swarm_mj.protocol.packets import fitting, packet_of, with_room
+from swarm_mj.protocol.packets import Packet, fitting, packet_of, with_room
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.obstruction import blocked
-from swarm_mj.system.fields import check_kind
+from swarm_mj.system.fields import check_kind, name_of
 
 MAX_THREADS = 1024
 
@@ -146,7 +151,13 @@ class Swarm:
         Raises ValueError if its packets never fit into a slot, and TypeError if it is no policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
-        room = policy.packet(self.mission).num_entries
+        check_parameters(policy)
+        packet = policy.packet(self.mission)
+        if not isinstance(packet, Packet):
+            raise ValueError(
+                f"packet() of {name_of(policy)} must return a Packet, not {packet!r:.80}"
+            )
+        room = packet.num_entries
         # A policy's type says what it may know: a centre the truth, robots what they believe.
         if isinstance(policy, CentralisedPolicy):
             policy.inform(self._truth)

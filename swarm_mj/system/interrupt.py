@@ -7,6 +7,7 @@ from contextlib import contextmanager
 from types import FrameType
 from typing import Any
 
+_pressed = [False]  # whether Ctrl-C was pressed within `interruptible`
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -16,23 +17,33 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 
     It yields whether one did, for a library may turn the exception into another.
     """
-    was_interrupted = False
+    _pressed[0] = False
 
     def interrupt(number: int, frame: FrameType | None) -> None:
-        nonlocal was_interrupted
-        was_interrupted = True
+        _pressed[0] = True
         signal.default_int_handler(number, frame)
 
-    with _heard_by(interrupt, in_place_of=(signal.SIG_DFL, signal.default_int_handler)):
-        yield lambda: was_interrupted
+    try:
+        with _heard_by(interrupt, in_place_of=(signal.SIG_DFL, signal.default_int_handler)):
+            yield lambda: _pressed[0]
+    finally:
+        _pressed[0] = False
+
+
+def raise_if_interrupted() -> None:
+    """Raise KeyboardInterrupt if Ctrl-C was pressed earlier, and a library swallowed it."""
+    if _pressed[0]:
+        raise KeyboardInterrupt
 
 
 @contextmanager
 def deferred_interrupt() -> Iterator[Callable[[], bool]]:
     """Only note the first Ctrl-C within it; a second one interrupts at once, as ever.
 
-    It yields whether Ctrl-C was pressed.
+    It yields whether Ctrl-C was pressed. Raises KeyboardInterrupt at once if it was pressed before
+    and a library swallowed that, as code may that runs while modules load.
     """
+    raise_if_interrupted()
     was_pressed = False
 
     def note(number: int, frame: FrameType | None) -> None:

@@ -68,6 +68,8 @@ def test_values_out_of_range_are_refused(arguments, complaint):
             "ann --place p --cake 3 --drnk tea",
             "unrecognized arguments: --drnk tea; did you mean --drink?",
         ),
+        ("ann --place p --cakes=--", "argument --cakes: expected a value, not '--'"),
+        ("ann --place p --sizes=--", "argument --sizes: expected a value, not '--'"),
         ("ann --p p --cakes", "argument --cakes: expected one argument"),
         ("ann --place p --note 3", "unrecognized arguments: --note 3"),
     ],

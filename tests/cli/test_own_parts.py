@@ -10,6 +10,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarm_mj.cli import main
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import read_weights, save_weights
@@ -243,3 +244,49 @@ def test_a_class_that_has_changed_does_not_fit_the_network(typed, trained):
     code, complaint, _ = typed("fly", "--policy", "./other", *options)
     assert code == 2
     assert "was trained on 2 features, and my_other:Ages now has 3" in complaint
+
+
+ODD = """
+import numpy as np
+from swarm_mj.policies.tdma import Tdma
+
+class NoPacket(Tdma):
+    def packet(self, mission):
+        return None
+
+class Single(Tdma):
+    @property
+    def parameters(self):
+        return {"p": np.float32(0.5)}
+
+class Leaves(Tdma):
+    def transmits(self, views):
+        raise SystemExit(0)
+
+class Stops(Tdma):
+    def transmits(self, views):
+        next(iter(()))
+"""
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("NoPacket", "packet() of NoPacket must return a Packet, not None"),
+        ("Single", "parameter p of Single must be a plain number"),
+        ("Leaves", "raised SystemExit: 0 ("),
+        ("Stops", "raised StopIteration ("),
+    ],
+)
+def test_what_a_policy_of_ones_own_does_wrong_is_said_in_one_line(here, capsys, name, said):
+    (here / "odd.py").write_text(ODD)
+    flown = ["fly", "--policy", f"odd:{name}", "--no-record", "--robots", "3", "--windows", "3"]
+    assert main([*flown, "--json", "x.json"]) == 2
+    assert said in capsys.readouterr().err.splitlines()[-1]
+
+
+@pytest.mark.usefixtures("here")
+def test_an_observer_must_be_a_robot_also_without_a_replay(capsys):
+    flown = ["fly", "--policy", "tdma", "--no-record", "--robots", "3", "--windows", "3"]
+    assert main([*flown, "--observer", "7"]) == 2
+    assert "observer must be from 0 to 2, not 7" in capsys.readouterr().err

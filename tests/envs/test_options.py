@@ -118,3 +118,8 @@ def test_every_task_has_an_environment(task, recwarn):
     assert env.unwrapped.batch.mission.task == task
     assert env.unwrapped.batch.mission.num_robots == 3
     assert gymnasium.spec(environment_id(task)).vector_entry_point is not None
+
+
+def test_an_arena_that_is_not_there_is_refused_at_once():
+    with pytest.raises(ValueError, match="there is no such file"):
+        make_batch("stationary", arena="/nope.xml")

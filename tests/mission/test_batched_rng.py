@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from swarm_mj.mission.batched_rng import BLOCK, Stream, normal, streams_of, uniform
+from swarm_mj.mission.batched_rng import BLOCK, Stream, check_seeds, normal, streams_of, uniform
 
 SEEDS = [3, 1, 4, 15]
 LENGTH = 2 * BLOCK + 5  # over two borders of the blocks drawn ahead
@@ -50,3 +50,8 @@ def test_streams_that_were_added_later_changed_no_other(seed):
         assert stream.random(4).tolist() == expected.random(4).tolist()
     drawn = [rng.random() for rng in (*three, *streams[3:])]
     assert len(set(drawn)) == len(drawn)
+
+
+def test_true_is_no_seed():
+    with pytest.raises(ValueError, match="integers from 0"):
+        check_seeds([True])

@@ -195,3 +195,8 @@ def test_what_cannot_be_known_is_refused(given, complaint):
     with pytest.raises(ValueError, match=r"^prior knowledge must be") as refusal:
         Unchecked(prior_knowledge=given)
     assert complaint in str(refusal.value)
+
+
+def test_an_arena_is_a_name():
+    with pytest.raises(ValueError, match="arena must be a name, not 3"):
+        Unchecked(arena=3)

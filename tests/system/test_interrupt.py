@@ -2,6 +2,7 @@
 
 import signal
 import threading
+from contextlib import suppress
 
 import pytest
 
@@ -89,3 +90,13 @@ def test_a_handler_that_is_not_python_s_stays(monkeypatch):
     with interruptible(), deferred_interrupt():
         pass
     assert replaced == []
+
+
+def test_an_interrupt_that_a_library_swallowed_is_not_lost():
+    with interruptible():
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(signal.SIGINT)
+        with pytest.raises(KeyboardInterrupt), deferred_interrupt():
+            raise AssertionError("the work has begun")
+    with deferred_interrupt() as is_interrupted:  # of work that is not within it any more
+        assert not is_interrupted()
