@@ -22,7 +22,6 @@ HalfDuplex = Literal["strict", "eavesdroppers"]
 FlockingSet = Literal["heard", "moving"]
 PathLossLaw = Literal["free-space", "log-distance", "two-ray"]
 FadingLaw = Literal["none", "rayleigh", "rician"]
-Number = float | int | None
 Grant = Literal["map", "statistics", "start"]  # what robots may know before the mission
 Knowable = Literal["nothing", Grant]
 
@@ -51,7 +50,13 @@ NEW = "not the paper's"  # the source of what the paper has not
 
 
 def _number(
-    default: Number, label: str, unit: str, low: float, high: float, help: str = "", **more: str
+    default: float | int | None,
+    label: str,
+    unit: str,
+    low: float,
+    high: float,
+    help: str = "",
+    **more: str | bool,
 ) -> FieldOf:
     """Return a number: name in words, unit, range; with help, an option. By default of IV-B."""
     about = {"source": "IV-B"} | more
@@ -80,8 +85,7 @@ def in_order(prior_knowledge: str) -> str:
 class Mission:
     """A mission's numbers; the defaults are the paper's text (IV-B).
 
-    A field with a help text is an option of the command line, too: `range_ratio` is `--range-ratio`
-    and `num_robots` is `--robots` (`cli.options` makes them).
+    A field with a help text is an option, too: `num_robots` is `--robots` (`cli.options`).
 
     Raises:
         ValueError: A field is outside its range; the message names the value and the range.
@@ -112,8 +116,8 @@ class Mission:
     noise_dbm: float = _number(
         -50.0, "noise power", "dBm", -200.0, 50.0, "transmit power follows it", group=CHANNEL
     )
-    sensing_dbm: float = _radio(
-        -57.0, "sensing threshold", "dBm", -200.0, 50.0, "from where on csma finds its channel busy"
+    sensing_dbm: float = _radio(  # files of development versions lack it
+        -57.0, "sensing threshold", "dBm", -200.0, 50.0, "power that csma senses", may_lack=True
     )
     frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
     failure_fraction: float = _number(

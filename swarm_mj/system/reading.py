@@ -135,7 +135,7 @@ def _with_all_keys(value: object, kind: object, at: str = "$") -> object:
     """Return a dataclass's plain values by the present names of its fields, nested ones included.
 
     msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file would
-    pass.
+    pass. Fields that say `may_lack` are newer than some files: there they have their default.
     """
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
@@ -146,6 +146,8 @@ def _with_all_keys(value: object, kind: object, at: str = "$") -> object:
     for key in named.keys() - known.keys():
         raise ValueError(f"Object contains unknown field `{key!s:.40}` - at `{at}`")
     for name in known.keys() - named.keys():
+        if known[name].metadata.get("may_lack"):
+            continue
         raise ValueError(f"Object missing required field `{name}` - at `{at}`")
     return {
         key: _with_all_keys(each, known[key].type, f"{at}.{key}") for key, each in named.items()

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 
 import pytest
 
-from swarm_mj.system.reading import open_file, read_document, read_file, read_json
+from swarm_mj.system.fields import setting
+from swarm_mj.system.reading import open_file, read_document, read_file, read_json, read_plain
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -24,6 +25,12 @@ class Outer:
     inner: Inner
     names: tuple[str, ...] = ()
     more: dict[str, int] | None = None
+
+
+@dataclass(frozen=True, kw_only=True)
+class Grown:
+    old: int
+    new: int = setting(7, may_lack=True)
 
 
 SOUND = {"inner": {"x": 1}, "names": ["a"], "more": None}
@@ -112,3 +119,10 @@ def test_a_document_says_what_it_is():
     ):
         with pytest.raises(ValueError, match=complaint):
             read_document(text(**header), "f", 2, Outer)
+
+
+def test_a_field_that_is_newer_than_a_file_has_its_default():
+    assert read_plain({"old": 1}, Grown) == Grown(old=1)
+    assert read_plain({"old": 1, "new": 2}, Grown) == Grown(old=1, new=2)
+    with pytest.raises(ValueError, match="missing required field `old`"):
+        read_plain({"new": 2}, Grown)
