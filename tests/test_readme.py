@@ -24,7 +24,7 @@ FENCE = re.compile(
 REASONS = {
     "opens a viewer": "replay|view|show|human",
     "needs OpenGL": "video|render",
-    "needs an environment of its own": "benchmarl|torchrl|ray",
+    "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari",
     "installs packages": "^pip install",
 }
 LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml"}
