@@ -142,13 +142,16 @@ def test_the_core_flies_the_default_and_says_what_it_lacks(core, tmp_path):
 
 
 def test_the_core_flies_on_the_command_line_but_records_nothing(core, tmp_path):
-    refused = core(tmp_path, "-m", "swarm_mj", "fly")
+    refused = core(tmp_path, "-m", "swarm_mj", "fly", "--record", "a.rrd")
     assert refused.returncode == 1
     assert "a replay needs rerun-sdk, which is not installed; pip install 'rerun" in refused.stderr
     assert refused.stderr.endswith("or fly without one: --no-record\n")
     assert list(tmp_path.iterdir()) == []
-    done = core(tmp_path, "-m", "swarm_mj", "fly", "--no-record")
+    done = core(tmp_path, "-m", "swarm_mj", "fly")
     assert done.returncode == 0, done.stderr
+    assert done.stderr.startswith(
+        "no replay is recorded: it needs rerun-sdk, which is not installed"
+    )
     assert "flocking, planner, 40 robots, seed 1" in done.stdout
     lacking = core(tmp_path, "-m", "swarm_mj", "replay", "a.rrd")
     assert lacking.returncode == 1

@@ -28,6 +28,7 @@ from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observe
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system import needs
+from swarm_mj.system.compiled import compiling
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import check_kind, check_names
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -103,7 +104,7 @@ def fly(
     swarm = Swarm(mission, [seed], **components.given)
     swarm.start(chosen)
     recorder = Recorder(swarm, ego=observer) if record else None
-    with quiet_console().status("Compiling, once for all flights ..."):
+    with quiet_console().status("Preparing the swarm ...") as status, compiling(status.update):
         compile_ahead(mission, name, **how)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=quiet_console())
     flown = fly_swarm(swarm, recorder, bar, way_on="")

@@ -22,16 +22,18 @@ from swarm_mj.replay.recorder import Recorder, check_observer
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.compiled import compiling
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits
-from swarm_mj.system.packages import need
+from swarm_mj.system.packages import is_installed, missing, need
 from swarm_mj.system.terminal import WorkBar, plain_console, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
+NO_REPLAY = "no replay is recorded: it"
 COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a first comparison
 
 
@@ -79,7 +81,7 @@ def run(options: FlyOptions) -> int:
     components = options.components.made(mission)
     registry.check_used(options.features, [policy])
     console = Console(stderr=True, highlight=False)
-    with console.status("Preparing the swarm (compiles once, then it is cached) ..."):
+    with console.status("Preparing the swarm ...") as status, compiling(status.update):
         compile_ahead(mission, name, **options.how)
         swarm = Swarm(mission, [options.seed], **components.given)
         swarm.start(policy)
@@ -143,6 +145,10 @@ def _replay_path(options: FlyOptions) -> Path | None:
         raise ValueError("--no-record is not allowed with --record; leave one out")
     if options.no_record and options.view:
         raise ValueError("--view needs a replay; leave out --no-record")
+    is_chosen = options.no_record or options.record or options.view
+    if not (is_chosen or is_installed("rerun")):
+        plain_console(is_error=True).print(missing("rerun", NO_REPLAY))
+        options = replace(options, no_record=True)
     path = None if options.no_record else options.record or _fresh_name(options)
     what, way_out = ("--record", "") if options.record else ("the replay", OTHERWISE)
     check_outputs(

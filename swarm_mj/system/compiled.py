@@ -15,11 +15,13 @@ import hashlib
 import inspect
 import re
 from collections.abc import Callable
+from contextlib import AbstractContextManager
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba import config, njit
 from numba.core import caching
+from numba.core.event import Event, Listener, install_listener
 
 from swarm_mj.system.interrupt import held_interrupts
 
@@ -71,6 +73,25 @@ def _stamped(dispatcher: Any) -> Any:  # noqa: ANN401 - numba's
     """
     dispatcher._cache._cache_file._version += digest(Path(dispatcher.py_func.__code__.co_filename))
     return dispatcher
+
+
+class _Count(Listener):
+    """Says how many functions are compiled, as numba says when it begins with one."""
+
+    def __init__(self, say: Callable[[str], object]) -> None:
+        self._say, self._number = say, 0
+
+    def on_start(self, event: Event) -> None:  # noqa: ARG002 - numba's
+        self._number += 1
+        self._say(f"Compiling the simulation, once for all flights: function {self._number} ...")
+
+    def on_end(self, event: Event) -> None:
+        """Say nothing more."""
+
+
+def compiling(say: Callable[[str], object]) -> AbstractContextManager[None]:
+    """Say within it, in a line, which function is compiled; nothing if all are in the cache."""
+    return install_listener("numba:compile", _Count(say))
 
 
 def digest(file: Path) -> str:

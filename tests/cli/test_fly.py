@@ -32,6 +32,18 @@ def test_the_default_flight_leaves_a_replay_of_the_default_mission(succeed, tmp_
     assert replay.stat().st_size < 5e6
 
 
+def test_without_rerun_a_flight_says_that_it_records_nothing(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(fly, "is_installed", lambda module: module != "rerun")
+    assert main(["fly", *SHORT]) == 0
+    out, err = capsys.readouterr()
+    assert err.count("\n") == 1
+    assert err.startswith("no replay is recorded: it needs rerun-sdk, which is not installed; pip")
+    assert "flocking, planner, 6 robots" in out
+    assert "Open the replay" not in out
+    assert not list(tmp_path.iterdir())
+
+
 def test_a_summary_is_what_the_library_computes(succeed, tmp_path):
     succeed(
         "fly", *SHORT, "--task", "random-walk", "--policy", "random-flooding", "--seed", 7,

@@ -55,6 +55,12 @@ from swarm_mj.physics import scaled
 if total.stats.cache_misses:
     print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled)))
 """
+SAID = """
+from swarm_mj.system.compiled import compiling
+from swarm_mj.loop import total
+with compiling(print):
+    total(4)
+"""
 
 
 class Checkout:
@@ -144,6 +150,12 @@ def test_ctrl_c_interrupts_only_once_a_function_is_whole(checkout):
     """
     assert checkout.python(INTERRUPTED + ASSUMED).split("\n") == ["1 4.0", "True False"]
     assert checkout.python(INTERRUPTED) == "1 4.0"
+
+
+def test_what_is_compiled_is_counted_as_it_begins(checkout):
+    lines = checkout.python(SAID).split("\n")
+    assert [line.endswith(f": function {n} ...") for n, line in enumerate(lines, 1)] == [True] * 2
+    assert checkout.python(SAID) == ""  # from the cache
 
 
 def test_the_digest_of_a_users_file_watches_its_own_package(tmp_path):
