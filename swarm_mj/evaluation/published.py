@@ -39,7 +39,8 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but sotdma, which is slow. The planners and gnn are drawn under `paper` only: gnn was trained
+# All but sotdma, which is slow, and csma, which is younger than these results. The planners and gnn
+# are drawn under `paper` only: gnn was trained
 # there, and they take several times as long as all others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it

@@ -85,7 +85,7 @@ def test_figures_need_no_folder_of_their_own(tmp_path):
 
 @pytest.mark.fault("odd machine: terminals")
 @pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-16", "utf-8"])
-@pytest.mark.parametrize("command", [FLIGHT, EVALUATION, BENCH])
+@pytest.mark.parametrize("command", [FLIGHT, (*EVALUATION, "--wide"), BENCH])
 @pytest.mark.usefixtures("here")
 def test_any_terminal_shows_what_it_can(monkeypatch, encoding, command):
     """Fault 26: `±` and `²` failed in ASCII when all was flown."""
