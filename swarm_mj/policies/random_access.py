@@ -24,7 +24,7 @@ class RandomTransmission(Policy):
         """Take the probability in [0, 1], whose meaning is each policy's own, or ValueError."""
         if not isinstance(probability, Real) or not 0.0 <= float(probability) <= 1.0:
             raise ValueError(f"transmission probability must be from 0 to 1, not {probability!r}")
-        self._probability = probability
+        self._probability = float(probability)  # NumPy's would not go into JSON
 
     @property
     def parameters(self) -> Parameters:

@@ -16,7 +16,8 @@ from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
 CENTRALISED = ["round-robin", "mst", "greedy-oracle"]
-DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
+SENSED = ["csma"]  # by the truth, which stands in for what robots sense before they transmit
+DECENTRALISED = [name for name in POLICIES if name not in (*CENTRALISED, *SENSED)]
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.
 PAYLOAD = {"planner": "snapshots"}  # what packets carry beyond T, M and P
@@ -130,7 +131,8 @@ def test_eq9_the_law_above_tells_cheats(cheat):
 @pytest.mark.parametrize("name", POLICIES)
 def test_ii_b_every_named_policy_is_of_one_kind_and_says_what_packets_carry(name):
     policy = make_policy(name, MISSION)
-    assert isinstance(policy, CentralisedPolicy) == (name in CENTRALISED)
+    assert isinstance(policy, CentralisedPolicy) == (name in (*CENTRALISED, *SENSED))
+    assert policy.is_centralised == (name in CENTRALISED)
     assert isinstance(policy, DecentralisedPolicy) == (name in DECENTRALISED)
     assert policy.payload == PAYLOAD.get(name, "none")
 
