@@ -6,6 +6,8 @@ robot's credit is 0.
 """
 
 import copy
+from collections.abc import Callable
+from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -19,6 +21,7 @@ from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
 Kind = TypeVar("Kind", bound=Channel | VaryingChannel)
+Replay = Callable[[np.ndarray, np.ndarray], np.ndarray]  # missions and recipients; gains
 
 
 def credits_of(
@@ -41,18 +44,35 @@ def credits_of(
         recipient = of_active(is_active, recipient)
         # Nothing is gained by news of a robot that has failed: it is not counted in the age.
         timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
+    replayed = partial(_replayed, timestamp, position_m, channel, now, is_active)
     at_once = isinstance(channel, (FreeSpaceRadio, VaryingChannel))
-    replay = _credits_at_once if at_once else _credits_in_turn
-    return replay(timestamp, position_m, recipient, channel, now, is_active)
+    credits_by = _credits_at_once if at_once else _credits_in_turn
+    return credits_by(recipient, replayed)
 
 
-def _credits_at_once(
+def _replayed(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
-    recipient: Int[np.ndarray, "B N"],
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
+    rows: Int[np.ndarray, "W"],
+    recipient: Int[np.ndarray, "W N"],
+) -> Float[np.ndarray, "W"]:
+    """Return the gains of the windows of these missions with other recipients [windows]."""
+    return gain(
+        timestamp,
+        position_m[rows],
+        recipient,
+        snapshot_channel(channel),
+        now[rows],
+        mission=rows,
+        is_active=None if is_active is None else is_active[rows],
+    )
+
+
+def _credits_at_once(
+    recipient: Int[np.ndarray, "B N"], replayed: Replay
 ) -> Float[np.ndarray, "B N"]:
     """Replay all windows as rows of one batch: ten times faster than one by one."""
     num_missions, num_robots = recipient.shape
@@ -60,43 +80,23 @@ def _credits_at_once(
     without = recipient[mission]  # one row per sender: everyone's recipients without it
     without[np.arange(sender.size), sender] = sender
     rows = np.concatenate([np.arange(num_missions), mission])  # the windows as they were come first
-    gained = gain(
-        timestamp,
-        position_m[rows],
-        np.concatenate([recipient, without]),
-        channel,
-        now[rows],
-        mission=rows,
-        is_active=None if is_active is None else is_active[rows],
-    )
+    gained = replayed(rows, np.concatenate([recipient, without]))
     credit = np.zeros(recipient.shape)
     credit[mission, sender] = gained[mission] - gained[num_missions:]
     return credit
 
 
 def _credits_in_turn(
-    timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N 2"],
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    is_active: Bool[np.ndarray, "B N"] | None,
+    recipient: Int[np.ndarray, "B N"], replayed: Replay
 ) -> Float[np.ndarray, "B N"]:
     """Replay B missions at a time: a user's channel meets them as in flight, draws included."""
     num_missions, num_robots = recipient.shape
     robots, missions = np.arange(num_robots), np.arange(num_missions)
-
-    def replayed(recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B"]:
-        again = snapshot_channel(channel)
-        return gain(
-            timestamp, position_m, recipient, again, now, mission=missions, is_active=is_active
-        )
-
-    together, sends = replayed(recipient), recipient != robots
+    together, sends = replayed(missions, recipient), recipient != robots
     credit = np.zeros(recipient.shape)
     turn = np.cumsum(sends, axis=1) * sends  # 1 for the first sender of a mission, and so on
     for n in range(1, int(turn.max(initial=0)) + 1):
-        gained = replayed(np.where(turn == n, robots, recipient))
+        gained = replayed(missions, np.where(turn == n, robots, recipient))
         credit += np.where(turn == n, (together - gained)[:, None], 0.0)
     return credit
 

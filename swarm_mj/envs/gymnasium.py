@@ -18,7 +18,8 @@ from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or
 from swarm_mj.envs.options import check_reset, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import moment
-from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer, has_display
+from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
+from swarm_mj.replay.view import has_display
 
 MODES = ("rgb_array", "human")
 RENDERING: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 10}  # 100 ms a window

@@ -8,7 +8,7 @@ from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.options import largest_feature
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.packet_memory import LONG_WINDOWS
-from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.buffers import Buffers
 
 NUM_OWN = 5  # numbers of a robot itself: x, y, their velocities, whether it is active
 
@@ -44,5 +44,4 @@ def truth(batch: MissionBatch) -> Float32[np.ndarray, "B S"]:
 def _log_ages(buffers: Buffers, now: np.ndarray) -> np.ndarray:
     """Return the ages of T: 0 is now, 1 is `LONG_WINDOWS` ago or never; at once, in NumPy."""
     age = np.log1p(np.minimum(now - buffers.timestamp, LONG_WINDOWS)) / np.log1p(LONG_WINDOWS)
-    is_known = (buffers.timestamp > NEVER) | buffers.is_granted[:, np.newaxis, np.newaxis]
-    return np.where(is_known, age, 1.0)
+    return np.where(buffers.is_known, age, 1.0)

@@ -1,8 +1,6 @@
 """Pictures of a mission's scene, drawn by MuJoCo without a screen, and a window on it."""
 
 import atexit
-import os
-import sys
 import threading
 import warnings
 from contextlib import AbstractContextManager
@@ -167,12 +165,6 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
         colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
         colour[3] = min(colour[3], OBSTACLE_OPACITY)
     return model
-
-
-def has_display() -> bool:
-    """Return whether a window may open here: Linux names its display, others have one always."""
-    names = ("DISPLAY", "WAYLAND_DISPLAY")
-    return sys.platform != "linux" or any(os.environ.get(name) for name in names)
 
 
 class SceneViewer:
