@@ -44,7 +44,8 @@ class Physics:
                 raise
             said = " ".join(str(error).split())
             raise ValueError(f"the scene does not compile: {said}") from error
-        self.obstacles = obstacles_of(self._model)
+        found = obstacles_of(self._model)
+        self.obstacles = found if len(found.kind) > 0 else None
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         shape = (num_missions, mission.num_robots, 2)
         self._qpos = self._batch.bind("qpos").reshape(shape)

@@ -23,7 +23,6 @@ from swarm_mj.radio.free_space import (
     transmit_power_dbm,
 )
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
-from swarm_mj.radio.obstruction import NO_OBSTACLES
 from swarm_mj.radio.power_law import (
     FREE_SPACE_EXPONENT,
     TWO_RAY_EXPONENT,
@@ -106,7 +105,7 @@ def radio_of(mission: Mission) -> FreeSpaceRadio:
 
 def mission_radio(
     mission: Mission,
-    obstacles: Obstacles = NO_OBSTACLES,
+    obstacles: Obstacles | None = None,
     own: Channel | VaryingChannel | None = None,
 ) -> MissionRadio:
     """Return a mission's channel, belief and truth.
@@ -118,7 +117,7 @@ def mission_radio(
     channel: Channel | VaryingChannel = radio
     if own is not None:
         channel = own
-    elif mission.beyond_free_space or len(obstacles.kind) > 0:
+    elif mission.beyond_free_space or obstacles is not None:
         channel = ComposedChannel(
             _law(mission, radio, obstacles),
             _reception(mission, radio),
@@ -130,9 +129,9 @@ def mission_radio(
     return MissionRadio(channel=channel, belief=_belief(mission, radio, obstacles), truth=truth)
 
 
-def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles) -> Belief:
+def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None) -> Belief:
     """Return what the mission grants to know of its channel."""
-    known = obstacles if mission.grants("map") else NO_OBSTACLES
+    known = obstacles if mission.grants("map") else None
     if mission.beyond_free_space and mission.grants("statistics"):
         return Belief(
             radio=radio,
@@ -140,7 +139,7 @@ def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles) -> Be
             reception=_reception(mission, radio),
             shadowing_db=mission.shadowing_db,
         )
-    if len(known.kind) > 0:
+    if known is not None:
         law = free_space_law(radio.received_at_1_m_mw, mission.num_robots, known)
         return Belief(radio=radio, law=law)
     return Belief(radio=radio)
@@ -153,7 +152,7 @@ def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:
     return power_mw
 
 
-def _law(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles) -> PowerLaw:
+def _law(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None) -> PowerLaw:
     """Return the law of the mission's mean powers [mW] between these obstacles."""
     breakpoint_m, exponent = math.inf, FREE_SPACE_EXPONENT
     if mission.path_loss == "log-distance":  # Rappaport 2002, Eq. 4.69

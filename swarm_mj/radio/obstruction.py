@@ -19,30 +19,20 @@ Interval = tuple[float, float]  # of the share of a line's way; empty if it ends
 
 EMPTY: Interval = (1.0, 0.0)
 
-# An empty table, not None: compiled loops then have one type, and end at once.
-NO_OBSTACLES = Obstacles(
-    kind=np.zeros(0, dtype=np.int64),
-    centre_m=np.zeros((0, 3)),
-    rotation=np.zeros((0, 3, 3)),
-    size_m=np.zeros((0, 3)),
-    reach_m=np.zeros(0),
-    power_left=np.zeros(0),
-)
-
 
 @compiled()
 def obstruct(
     i: int,
     position_m: Float[np.ndarray, "N 2"],
     height_m: float,
-    obstacles: Obstacles,
+    obstacles: Obstacles | None,
     power: Float[np.ndarray, "N"],
 ) -> None:
     """Multiply the power of i's packets at every other robot by what obstacles leave of it.
 
     The robots' antennas are at this height above the floor [m].
     """
-    if obstacles.kind.shape[0] == 0:
+    if obstacles is None:  # code for obstacles is then not even compiled
         return
     x, y = position_m[i, 0], position_m[i, 1]
     for j in range(position_m.shape[0]):

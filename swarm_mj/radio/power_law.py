@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.radio.fading import Waves, follow_robots, shadow
-from swarm_mj.radio.obstruction import NO_OBSTACLES, obstruct
+from swarm_mj.radio.obstruction import obstruct
 from swarm_mj.radio.reception import received_power
 from swarm_mj.system.compiled import compiled
 
@@ -29,7 +29,7 @@ class PowerLaw(NamedTuple):
     at_1_m: Float[np.ndarray, "N"]  # power of each robot's packets after one metre, in any unit
     breakpoint_m: float = math.inf  # up to which free space holds
     exponent: float = FREE_SPACE_EXPONENT  # n, beyond it
-    obstacles: Obstacles = NO_OBSTACLES
+    obstacles: Obstacles | None = None
 
 
 class MeanPowers(NamedTuple):
@@ -55,7 +55,7 @@ def no_powers(law: PowerLaw, num_missions: int) -> MeanPowers:
     )
 
 
-def free_space_law(at_1_m: float, num_robots: int, obstacles: Obstacles = NO_OBSTACLES) -> PowerLaw:
+def free_space_law(at_1_m: float, num_robots: int, obstacles: Obstacles | None = None) -> PowerLaw:
     """Return the law of a team whose packets all have this power after one metre."""
     return PowerLaw(np.full(num_robots, at_1_m), obstacles=obstacles)
 

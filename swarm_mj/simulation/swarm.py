@@ -107,7 +107,7 @@ class Swarm:
     def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
         mission, channel = self.mission, self.channel
-        has_obstacles = len(self._physics.obstacles.kind) > 0
+        has_obstacles = self._physics.obstacles is not None
         is_asked = isinstance(channel, ComposedChannel)
         return connected_positions(
             num_robots=mission.num_robots,
@@ -121,7 +121,9 @@ class Swarm:
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
-        is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self._physics.obstacles)
+        is_blocked = np.zeros(len(position_m), dtype=bool)
+        if (obstacles := self._physics.obstacles) is not None:
+            is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, obstacles)
         if self.mission.collide:
             apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
             overlaps = np.tril(apart_m < 2.0 * ROBOT_RADIUS_M, k=-1)  # the first one may stay

@@ -15,13 +15,14 @@ import hashlib
 import inspect
 import re
 from collections.abc import Callable
-from contextlib import AbstractContextManager
+from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba import config, njit
-from numba.core import caching
+from numba.core import caching, config, types
 from numba.core.event import Event, Listener, install_listener
+from numba.core.registry import CPUDispatcher
+from numba.core.runtime.nrt import rtsys
 
 from swarm_mj.system.interrupt import held_interrupts
 
@@ -38,41 +39,67 @@ def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Funct
     are said, so here they always are. Type checkers see the function as it was.
     """
     # Checks for divisions by zero would keep loops that divide from being as fast as they can be.
-    options: Any = {"fastmath": fastmath, "error_model": "numpy"}
+    options = {"nopython": True, "fastmath": fastmath, "error_model": "numpy"}
 
     def decorate(function: Function) -> Function:
         plain = inspect.unwrap(function)  # of the checks that tests put around all functions
-        numba: Any = config
-        before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
-        try:
-            dispatcher: Any = _stamped(njit(cache=True, **options)(plain))
-        except RuntimeError:  # no place for a cache
-            dispatcher = njit(**options)(plain)
-        finally:
-            numba.CACHE_LOCATOR_CLASSES = before
-        dispatcher.compile = _whole(dispatcher.compile)
-        return cast(Function, dispatcher)
+        return cast(Function, _Loop(plain, options))
 
     return decorate
 
 
-def _whole(compile: Function) -> Function:
-    """Let a Ctrl-C wait until a function is compiled, or loaded from the cache.
+class _Loop(CPUDispatcher):
+    """A function for Python and, compiled apart, the same for other compiled functions.
 
-    LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
-    made, and the process fails later, or crashes when it ends.
+    To take Python's objects apart and to make new ones takes half of the time to compile a small
+    function. What compiled functions call need not, and is a part of what they are cached as.
     """
-    return cast(Function, lambda *arguments: held_interrupts()(compile)(*arguments))
+
+    def __init__(self, function: Callable[..., Any], options: dict[str, Any]) -> None:
+        """Prepare both, and a place for the cache of the first, if there is one."""
+        options = {**options, "no_cfunc_wrapper": True}
+        super().__init__(function, targetoptions=options)
+        options = {**options, "no_cpython_wrapper": True}
+        self.inner = CPUDispatcher(function, targetoptions=options)
+        numba: Any = config
+        before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
+        with suppress(RuntimeError):  # no place for a cache
+            self._cache = _Cache(function)
+        numba.CACHE_LOCATOR_CLASSES = before
+
+    @property
+    def _numba_type_(self) -> types.Dispatcher:
+        """The function that compiled ones call under this name."""
+        return types.Dispatcher(self.inner)
+
+    @held_interrupts()
+    def compile(self, sig: Any) -> Any:  # noqa: ANN401 - numba's
+        """Let a Ctrl-C wait until a function is compiled, or loaded from the cache.
+
+        LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
+        made, and the process fails later, or crashes when it ends.
+        """
+        return super().compile(sig)
 
 
-def _stamped(dispatcher: Any) -> Any:  # noqa: ANN401 - numba's
-    """Let numba compare the digest before it unpickles the rest of an index.
+class _Cache(caching.FunctionCache):
+    """A function's cache, which the digest of its files keeps up to date."""
 
-    An index of other code may name classes that no longer exist, which would end the program.
-    numba compares its own version first, so the digest joins it.
-    """
-    dispatcher._cache._cache_file._version += digest(Path(dispatcher.py_func.__code__.co_filename))
-    return dispatcher
+    def __init__(self, function: Callable[..., Any]) -> None:
+        """Let numba compare the digest before it unpickles the rest of an index.
+
+        An index of other code may name classes that no longer exist, which would end the program,
+        and so may one of the same file imported by another name. numba compares its own version
+        first, so digest and name join it.
+        """
+        super().__init__(function)
+        file = Path(function.__code__.co_filename)
+        self._cache_file._version += digest(file) + function.__module__
+
+    def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401 - numba's
+        """Load a function without all that numba imports to compile one, which takes 0.5 s."""
+        rtsys.initialize(target_context)
+        return self._load_overload(sig, target_context)
 
 
 class _Count(Listener):

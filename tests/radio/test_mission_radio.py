@@ -14,7 +14,6 @@ from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import TrueLinks, mission_radio, radio_of
-from swarm_mj.radio.obstruction import NO_OBSTACLES
 
 
 def test_radio_is_the_missions():
@@ -119,7 +118,7 @@ WALL = walls(0.1, 0)  # 10 dB, between x < 0 and x > 0
 ON_A_LINE_M = np.array([[-100.0, 0.0], [-20.0, 0.0], [100.0, 0.0]])
 
 
-def chances(position_m=ON_A_LINE_M, *, obstacles=NO_OBSTACLES, **fields):
+def chances(position_m=ON_A_LINE_M, *, obstacles=None, **fields):
     """What the robots of such a mission believe that lone packets decode with."""
     belief = mission_radio(paper(num_robots=len(position_m), **fields), obstacles).belief
     return lone_probabilities(belief.links(position_m))

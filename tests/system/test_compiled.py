@@ -53,13 +53,22 @@ except KeyboardInterrupt:
 ASSUMED = """
 from swarm_mj.physics import scaled
 if total.stats.cache_misses:
-    print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled)))
+    print(*(" fast " in str(function.inspect_llvm()) for function in (total, scaled.inner)))
 """
 SAID = """
 from swarm_mj.system.compiled import compiling
 from swarm_mj.loop import total
 with compiling(print):
     total(4)
+"""
+# How often the function inside is compiled, and whether all that numba compiles with is imported.
+PARTS = """
+import sys
+from swarm_mj.loop import total
+from swarm_mj.physics import Pair, scaled
+total(4)
+print("numba.np.arraymath" in sys.modules, len(scaled.signatures), len(scaled.inner.signatures))
+print(scaled(Pair(2.0)))
 """
 
 
@@ -127,6 +136,24 @@ def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
     assert files_of(beside) == before
 
 
+def test_a_file_may_be_imported_by_two_names(tmp_path):
+    """What a cache holds names classes by their module, which may not exist by that name."""
+    (tmp_path / "inside").mkdir()
+    source = PHYSICS.format(factor=2.0, half=0.5, name="Pair")
+    (tmp_path / "inside" / "loops.py").write_text(source)
+    for folder, module in [("inside", "loops"), (".", "inside.loops")]:
+        code = f"import {module} as loops; print(loops.scaled(loops.Pair(1.0)))"
+        done = subprocess.run(
+            [sys.executable, "-c", code],
+            cwd=tmp_path / folder,
+            env={k: v for k, v in os.environ.items() if k != "NUMBA_CACHE_DIR"},
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.stdout.strip() == "2.0", done.stderr
+
+
 def test_the_cache_is_where_it_is_to_be_else_in_the_user_s_folder_or_nowhere(checkout, tmp_path):
     """A file where the package's folder should be cannot be written to by anyone."""
     value, _, path = checkout.run(NUMBA_CACHE_DIR=str(tmp_path / "given"))
@@ -150,6 +177,12 @@ def test_ctrl_c_interrupts_only_once_a_function_is_whole(checkout):
     """
     assert checkout.python(INTERRUPTED + ASSUMED).split("\n") == ["1 4.0", "True False"]
     assert checkout.python(INTERRUPTED) == "1 4.0"
+
+
+def test_what_compiled_functions_call_is_not_compiled_for_python(checkout):
+    """From the cache, it is a part of its caller, and nothing that compiles is imported for it."""
+    assert checkout.python(PARTS).split() == ["True", "0", "1", "4.0"]
+    assert checkout.python(PARTS).split() == ["False", "0", "0", "4.0"]
 
 
 def test_what_is_compiled_is_counted_as_it_begins(checkout):

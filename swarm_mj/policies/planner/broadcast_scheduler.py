@@ -43,7 +43,6 @@ class Problem(NamedTuple):
     depth: int  # how long each is followed, the slot in question included [slots]
 
 
-@compiled()
 def schedule_slot(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
@@ -54,16 +53,13 @@ def schedule_slot(
 
     Slots that are not free, this one or one of those looked ahead to, are silent.
     """
-    observe_own(timestamp, now)
-    if not is_free[0]:
-        return np.zeros(timestamp.shape[0], dtype=np.bool_)
     first = NOBODY
-    if problem.width > 1:
+    if problem.width > 1 and is_free[0]:
         first = _best_first(timestamp, now, problem, is_free)
-    return _choose(timestamp, problem, first)
+    _, transmits = _follow(timestamp, now, problem, first, is_free[:1])
+    return transmits
 
 
-@compiled()
 def _best_first(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
@@ -71,25 +67,31 @@ def _best_first(
     is_free: Bool[np.ndarray, "depth"],
 ) -> int:
     """Return the first transmitter of a slot by whose branch most is known, or `NOBODY`."""
-    num_robots = timestamp.shape[0]
-    gain, _ = _gains(timestamp, problem)
-    air, nobody = silent_air(num_robots), np.zeros(num_robots, dtype=np.bool_)
-    alone = np.empty(num_robots)
-    for i in range(num_robots):
-        alone[i] = _value(problem.links, gain, air, nobody, i)
-    best, most_known = NOBODY, -np.inf
+    alone = _values_alone(timestamp, now, problem)
+    best, most_known = int(NOBODY), -np.inf
     for _ in range(problem.width):
-        first, first_value = NOBODY, 0.0
-        for i in range(num_robots):
-            if alone[i] > first_value:
-                first, first_value = i, alone[i]
-        if first == NOBODY:
+        first = int(np.argmax(alone))
+        if alone[first] <= 0.0:
             return best
         alone[first] = 0.0
-        known = _follow(timestamp, now, problem, first, is_free)
+        known, _ = _follow(timestamp.copy(), now, problem, first, is_free)
         if known > most_known:
             best, most_known = first, known
     return best
+
+
+@compiled()
+def _values_alone(
+    timestamp: Float32[np.ndarray, "N N"], now: float, problem: Problem
+) -> Float[np.ndarray, "N"]:
+    """Return the value of the slot that ends now for each robot that might transmit alone."""
+    observe_own(timestamp, now)
+    gain, _ = _gains(timestamp, problem)
+    alone = np.zeros(timestamp.shape[0])
+    for i in range(timestamp.shape[0]):
+        for j in range(timestamp.shape[0]):
+            alone[i] += gain[i, j] * problem.lone[i, j]
+    return alone
 
 
 @compiled()
@@ -98,23 +100,23 @@ def _follow(
     now: float,
     problem: Problem,
     first: int,
-    is_free: Bool[np.ndarray, "depth"],
-) -> float:
-    """Return the sum of all timestamps after each of the slots that begin with this transmitter."""
-    timestamp = timestamp.copy()
-    known = 0.0
+    is_free: Bool[np.ndarray, "P"],
+) -> tuple[float, Bool[np.ndarray, "N"]]:
+    """Bring `timestamp` to the end of slots, of which the first begins with this transmitter.
+
+    Return the sum of all timestamps after each of them, and who transmits in the last.
+    """
+    known, transmits = 0.0, np.zeros(timestamp.shape[0], dtype=np.bool_)
     for p in range(is_free.shape[0]):
-        if p > 0:
-            now += 1.0
-            observe_own(timestamp, now)
+        observe_own(timestamp, now + p)
         if is_free[p]:
-            _choose(timestamp, problem, first if p == 0 else NOBODY)
+            transmits = _choose(timestamp, problem, first if p == 0 else NOBODY)
         total = np.float32(0.0)
         for i in range(timestamp.shape[0]):
             for k in range(timestamp.shape[0]):
                 total += timestamp[i, k]
         known += float(total)
-    return known
+    return known, transmits
 
 
 @compiled()
