@@ -87,15 +87,16 @@ def compose(
 
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
     """Let a scene change the arena, but neither the robots' joints nor how MuJoCo steps."""
-    before, motion, flags = _movable(spec), _motion(spec), spec.option.disableflags
+    before, flags = _motion(spec), spec.option.disableflags
     scene(spec, mission)
-    if _movable(spec) != before:
+    after = _motion(spec)
+    if list(after) != list(before):
         raise ValueError(
             "a scene may add bodies, geoms and sites, but no joints or actuators, and must leave "
             "the robots' own"
         )
-    for name, value in _motion(spec).items():
-        if value != motion[name]:
+    for name, value in after.items():
+        if value != before[name]:
             raise ValueError(
                 f"a scene must leave how robots move, but changed {name}; add geoms instead"
             )
@@ -117,11 +118,6 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
     geom.solref = [0.0, -2.0 / timestep_s(mission)]
     geom.solimp = ELASTIC_SOLIMP
     geom.priority = priority
-
-
-def _movable(spec: MjSpec) -> list[str]:
-    """Return the names of joints and actuators, in MuJoCo's order."""
-    return [part.name for part in (*spec.joints, *spec.actuators)]
 
 
 def _motion(spec: MjSpec) -> dict[str, str]:

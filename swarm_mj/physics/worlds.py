@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 from mujoco import batch
+from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import obstacles_of
@@ -44,6 +45,8 @@ class Physics:
                 raise
             said = " ".join(str(error).split())
             raise ValueError(f"the scene does not compile: {said}") from error
+        if scene is not None:
+            _check_free(self._model)
         found = obstacles_of(self._model)
         self.obstacles = found if len(found.kind) > 0 else None
         self._batch = batch.Batch(self._model, num_missions, num_threads)
@@ -126,6 +129,16 @@ class Physics:
         np.clip(self._qvel, -limit_mps, limit_mps, out=self._qvel)  # rounding of the last step
         self.states = replace(
             self.states, position_m=self._qpos.copy(), velocity_mps=self._qvel.copy()
+        )
+
+
+def _check_free(model: MjModel) -> None:
+    """Raise ValueError if a scene made robots heavier or lighter, or tied them to anything."""
+    is_tied = model.neq + model.ntendon > 0
+    if is_tied or not np.allclose(model.dof_M0, ROBOT_MASS_KG):
+        raise ValueError(
+            "a scene must leave how robots move, but changed their mass or tied them; give geoms "
+            "on robots mass=0, and add neither equalities nor tendons"
         )
 
 

@@ -2,7 +2,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from mujoco import mjtGeom
+from mujoco import mjtEq, mjtGeom
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
@@ -234,6 +234,37 @@ def test_what_a_scene_adds_stops_robots_in_contact_physics_only(physics, is_stop
         states = worlds.step(np.array([[[20.0, 0.0]] * 2]))
     expected = -5.0 - 0.5 if is_stopped else 35.0
     np.testing.assert_allclose(states.position_m[0, :, 0], expected, atol=0.1)
+
+
+def heavier(spec, _mission):
+    spec.geom("r0/hull").mass = 5.0
+
+
+def with_a_load(spec, _mission):
+    spec.body("r0/body").add_geom(type=mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1])
+
+
+def coupled(spec, _mission):
+    spec.add_equality(type=mjtEq.mjEQ_JOINT, name1="r0/x", name2="r1/x")
+
+
+@pytest.mark.parametrize("scene", [heavier, with_a_load, coupled])
+def test_a_scene_that_makes_robots_heavier_or_ties_them_is_refused(scene):
+    with pytest.raises(ValueError, match=r"must leave how robots move.*mass=0"):
+        Physics(crowded(), 1, scene=scene)
+
+
+def test_a_scene_may_add_what_weighs_nothing_to_robots():
+    def with_a_flag(spec, _mission):
+        spec.body("r0/body").add_geom(type=mjtGeom.mjGEOM_BOX, size=[0.1, 0.1, 0.1], mass=0.0)
+
+    mission = crowded()
+    start_m, start_mps, (wanted,) = drawn(mission, 1)
+    plain, flagged = (
+        placed(mission, start_m, start_mps, scene=scene).step(wanted)
+        for scene in (None, with_a_flag)
+    )
+    np.testing.assert_array_equal(flagged.position_m, plain.position_m)
 
 
 def test_robots_meet_what_a_scene_adds_but_no_other_robot():
