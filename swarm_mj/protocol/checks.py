@@ -6,9 +6,9 @@ Index order: `[b, i]` is robot `i` of mission `b`.
 import numpy as np
 from jaxtyping import Float, Int
 
+from swarm_mj.mission.components import is_ours
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.radio.composed import SlotChannel
-from swarm_mj.radio.free_space import Channel, FreeSpaceRadio
+from swarm_mj.radio.free_space import Channel
 from swarm_mj.system.fields import name_of
 
 
@@ -41,7 +41,7 @@ def checked_decode(
     Raises:
         ValueError: A user's own channel answered what is no robot, or a robot that is silent.
     """
-    if isinstance(channel, (FreeSpaceRadio, SlotChannel)):
+    if is_ours(channel):
         return channel(position_m, recipient.copy())  # in the one layout it is compiled for
     heard = np.asarray(channel(position_m.copy(), recipient.copy()))
     name = name_of(channel)

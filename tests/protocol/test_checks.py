@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_mj.protocol.checks import check_robots, checked_decode
+from swarm_mj.radio.free_space import FreeSpaceRadio
 
 POSITION_M = np.zeros((1, 4, 2))
 RECIPIENT = np.array([[1, 1, -1, 3]])  # 0 addresses 1, 2 broadcasts; 1 and 3 are silent
@@ -59,6 +60,16 @@ def test_a_robot_that_transmits_may_be_decoded_by_one_that_does_too():
 def test_what_no_radio_does_is_refused(heard, complaint):
     with pytest.raises(ValueError, match=complaint):
         checked_decode(answering(*heard), POSITION_M, RECIPIENT)
+
+
+def test_a_radio_made_from_the_package_s_is_a_user_s_own():
+    class Wishful(FreeSpaceRadio):
+        def __call__(self, _position_m, recipient):
+            return np.full_like(recipient, 3)
+
+    wishful = Wishful(power_mw=1.0, noise_mw=1.0, threshold=1.0, frequency_hz=2.4e9)
+    with pytest.raises(ValueError, match=r"channel Wishful let robot 0 .* which is silent"):
+        checked_decode(wishful, POSITION_M, RECIPIENT)
 
 
 def test_it_may_write_what_it_gets():
