@@ -202,18 +202,17 @@ def _mismatch_curves(log: Log) -> list[PlotCurve]:
     at = window - log.window[0]
     links = by_kind(log.mismatch.links)
     num = {kind: np.bincount(its["row"], minlength=len(at)) for kind, its in links.items()}
-    num_others = np.sum(log.is_on[at], axis=1) - 1
-    num_cut_off = np.sum(log.is_cut_off[at], axis=1)
+    too_weak = num["too_weak"] / np.maximum(1, log.num_believed)
+    unbelieved = num["unbelieved"] / np.maximum(1, log.num_working)
     shares = {
-        "believed, too weak": (palette.TOO_WEAK, num["too_weak"], log.num_believed),
-        "works, unbelieved": (palette.UNBELIEVED, num["unbelieved"], log.num_working),
-        f"cut off from r{log.ego}": (palette.EGO, num_cut_off, num_others),
+        "believed, too weak": (palette.TOO_WEAK, too_weak),
+        "works, unbelieved": (palette.UNBELIEVED, unbelieved),
+        f"cut off from r{log.ego}": (palette.EGO, log.cut_off_share[at]),
     }
     curves = []
-    for name, (colour, part, of) in shares.items():
+    for name, (colour, share) in shares.items():
         path = "world/" + name.replace(" ", "_")
-        share = 100.0 * part / np.maximum(1, of)
-        curves.append(PlotCurve(path, name, colour, share, window=window))
+        curves.append(PlotCurve(path, name, colour, 100.0 * share, window=window))
     return curves
 
 

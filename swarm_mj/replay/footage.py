@@ -115,6 +115,11 @@ class Footage:
         """True if the channel was compared with the belief about it: beyond free space."""
         return len(self.mismatch.window) > 0
 
+    @property
+    def cut_off_share(self) -> Float[np.ndarray, "T"]:
+        """The share of the other robots, those that are on, that is cut off from the ego robot."""
+        return np.sum(self.is_cut_off, axis=1) / np.maximum(1, np.sum(self.is_on, axis=1) - 1)
+
     @cached_property
     def colours(self) -> UInt8[np.ndarray, "T N 3"]:
         """The robots' colours."""

@@ -69,6 +69,15 @@ def test_at_once_only_the_observer_s_links_are_shown(two_way):
             assert colours.tolist() == [list(palette.UNBELIEVED)]
 
 
+def test_the_share_that_is_cut_off_is_of_robots_that_are_on(two_way):
+    is_on = np.ones_like(two_way.log.is_on)
+    is_cut_off = np.zeros_like(is_on)
+    is_on[1, 10:], is_cut_off[:2, 3:5] = False, True
+    made = replace(two_way.log, is_on=is_on, is_cut_off=is_cut_off)
+    assert is_on.shape[1] == 12
+    assert made.cut_off_share[:3].tolist() == [2.0 / 11.0, 2.0 / 9.0, 0.0]
+
+
 def test_an_open_area_is_shown_where_robots_ever_are(two_way):
     where, half_side_m = two_way.log.position_m, two_way.log.facts.mission.half_side_m
     seen = frame(where, half_side_m, is_tight=True)

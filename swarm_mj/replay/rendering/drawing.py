@@ -141,30 +141,30 @@ def draw_shortfalls(
 
     `robots` are all robots' places in the picture, `others` those at the far ends [pixels].
     """
-    small, shown = font(0.75 * size), np.zeros((0, 4))
-    on_robots = np.hstack([robots - 0.4 * size, robots + 0.4 * size])
+    small, shown = font(0.75 * size), np.zeros((0, 2, 2))
+    on_robots = np.stack([robots - 0.4 * size, robots + 0.4 * size], axis=1)
     for robot, margin in zip(others.tolist(), margin_db.tolist(), strict=True):
         text = f"{margin} dB"
         width, high = draw.textlength(text, small) + 2 * TAG, 0.95 * size
         # To the right, to the left, below or above: where it covers least.
-        sides = np.array([[0.7, -0.5], [-0.7, -0.5], [-0.5, 0.8], [-0.5, -1.8]]) * size
-        sides[1, 0] -= width
-        low = robots[robot] + sides
-        boxes = np.hstack([low, low + np.array([width, high])])
+        sides = [(0.7, -0.5), (-0.7 - width / size, -0.5), (-0.5, 0.8), (-0.5, -1.8)]
+        low = robots[robot] + size * np.array(sides)
+        boxes = np.stack([low, low + np.array([width, high])], axis=1)
         covered = LABELS_FIRST * _num_overlaps(boxes, shown) + _num_overlaps(boxes, on_robots)
         best = int(np.argmin(covered))
         if covered[best] < LABELS_FIRST:
             x, y = low[best].tolist()
             _draw_tag(draw, text, x + TAG, y, small)
-            shown = np.vstack([shown, boxes[best]])
+            shown = np.append(shown, boxes[[best]], axis=0)
 
 
 def _num_overlaps(
-    boxes: Float[np.ndarray, "S 4"], others: Float[np.ndarray, "O 4"]
+    boxes: Float[np.ndarray, "S 2 2"], others: Float[np.ndarray, "O 2 2"]
 ) -> Int[np.ndarray, "S"]:
-    one, other = boxes[:, None], others[None]
-    overlaps = (one[..., :2] < other[..., 2:]) & (other[..., :2] < one[..., 2:])
-    return np.sum(np.all(overlaps, axis=2), axis=1)
+    """Count how many others each box overlaps; boxes are upper left and lower right corners."""
+    low, high = np.moveaxis(boxes[:, None], 2, 0)
+    other_low, other_high = np.moveaxis(others[None], 2, 0)
+    return np.sum(np.all((low < other_high) & (other_low < high), axis=2), axis=1)
 
 
 def _draw_tag(draw: ImageDraw, text: str, x: float, y: float, small: Font) -> None:
@@ -199,11 +199,8 @@ class AgePlot:
         # Two missions' columns would look alike.
         if len(footages) == 1 and np.any(footages[0].is_cut_off):
             title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
-            # Columns: the share of the others that is cut off from the observer.
-            num_others = footages[0].facts.mission.num_robots - 1
-            left = float(inner.left)
-            share = (np.sum(footages[0].is_cut_off, axis=1) / num_others).tolist()
-            for (right, _), part in zip(self._curves[0], share, strict=True):
+            left, shares = float(inner.left), footages[0].cut_off_share.tolist()
+            for (right, _), part in zip(self._curves[0], shares, strict=True):
                 if part > 0.0:
                     top = inner.bottom - part * (inner.bottom - inner.top)
                     draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
