@@ -22,15 +22,11 @@ class Policy:
 
     is_centralised: bool = False  # whether a centre decides, or each robot by itself
     uses: str = ""  # the information that each robot decides by, or the centre, in a few words
+    payload: str = "none"  # what packets carry beyond T, M and P (II-B), in a word
 
     def window(self, mission: Mission) -> WindowProtocol:
         """Return what the robots do in a window: by Alg. 1 they request, and respond."""
         return RequestResponse(silence_is_attempt=mission.silence_is_attempt)
-
-    @property
-    def payload(self) -> str:
-        """The payload of packets beyond T, M and P (II-B); "none" in the paper."""
-        return "none"
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:  # noqa: ARG002
         """Return what packets carry beyond T, M and P; the mission says how wide fields must be."""

@@ -76,30 +76,23 @@ def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets
     """
     first, second = _count(phases[0]), _count(phases[1])
     transmitted = first.sent + second.sent
-    none = np.full_like(transmitted, np.nan)
     if is_broadcast:
-        return Packets(
-            sent=transmitted,
-            transmitted=transmitted,
-            attempted=none,
-            delivered=none,
-            lost=none,
-            overheard=none,
-            answered=none,
-            heard=first.heard + second.heard,
-            receptions=first.receptions + second.receptions,
-        )
-    return Packets(
-        sent=first.sent,
-        transmitted=transmitted,
-        attempted=first.sent,
-        delivered=first.delivered,
-        lost=first.sent - first.delivered,
-        overheard=first.overheard + second.overheard,
-        answered=second.delivered,
-        heard=none,
-        receptions=none,
-    )
+        counts = {
+            "sent": transmitted,
+            "heard": first.heard + second.heard,
+            "receptions": first.receptions + second.receptions,
+        }
+    else:
+        counts = {
+            "sent": first.sent,
+            "attempted": first.sent,
+            "delivered": first.delivered,
+            "lost": first.sent - first.delivered,
+            "overheard": first.overheard + second.overheard,
+            "answered": second.delivered,
+        }
+    none = dict.fromkeys(PACKET_COUNTS, np.full_like(transmitted, np.nan))
+    return Packets(**none | counts | {"transmitted": transmitted})
 
 
 def mean_hops(

@@ -22,7 +22,7 @@ from swarm_mj.radio.fading import (
     mixed,
 )
 from swarm_mj.radio.power_law import MeanPowers, PowerLaw, compute_powers, no_powers, place_robots
-from swarm_mj.radio.reception import Air, decoded, incoming_at, silent_air, transmit
+from swarm_mj.radio.reception import Air, add_to_air, decoded, incoming_at, silent_air
 from swarm_mj.system.compiled import compiled
 
 _FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for
@@ -193,7 +193,7 @@ def _faded_air(
                 if rule.rician_k != NO_FADING:
                     power_mw *= fade(link_key(fades, i, j), rule.rician_k)
                 may_hear = recipient[j] == j or (hears_while_sending and recipient[i] == j)
-                transmit(air, i, j, power_mw if may_hear else 0.0, power_mw)
+                add_to_air(air, i, j, power_mw if may_hear else 0.0, power_mw)
     return air
 
 

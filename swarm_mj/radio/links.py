@@ -19,11 +19,11 @@ from swarm_mj.radio.reception import (
     Air,
     Incoming,
     add_packet,
+    add_to_air,
     decode_probability,
     incoming_at,
     silent_air,
     sinr,
-    transmit,
 )
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import DB_PER_NEPER, from_db
@@ -120,7 +120,7 @@ def chance(links: Links, ratio: float, i: int, j: int) -> float:
 def broadcast(links: Links, air: Air, i: int) -> None:
     """Add i's packet to the air at every receiver."""
     for j in range(links.received_mw.shape[0]):
-        transmit(air, i, j, links.received_mw[i, j], links.interference_mw[i, j])
+        add_to_air(air, i, j, links.received_mw[i, j], links.interference_mw[i, j])
 
 
 @compiled()

@@ -65,7 +65,7 @@ class TrueLinks:
     """A channel before its fades: mean powers and statistics."""
 
     radio: FreeSpaceRadio
-    channel: ComposedChannel | None = None  # None is the radio in free space
+    channel: ComposedChannel | None = None  # None: in free space, or a user's own, which is unknown
 
     def links(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> Links:
         """Return the links between true positions of one mission, which has its own shadowing."""
@@ -113,25 +113,22 @@ def mission_radio(
     A user's own channel takes the place of the mission's. Belief stays that of the mission, and
     truth is free space: nothing else is known of such a channel.
     """
-    radio = radio_of(mission)
-    channel: Channel | VaryingChannel = radio
-    if own is not None:
-        channel = own
-    elif mission.beyond_free_space or obstacles is not None:
-        channel = ComposedChannel(
-            _law(mission, radio, obstacles),
-            _reception(mission, radio),
-            shadowing_db=mission.shadowing_db,
-            shadowing_distance_m=mission.shadowing_distance_m,
-        )
-    composed = channel if isinstance(channel, ComposedChannel) else None
-    truth = TrueLinks(radio=radio, channel=composed)
-    return MissionRadio(channel=channel, belief=_belief(mission, radio, obstacles), truth=truth)
+    radio, belief = radio_of(mission), _belief(mission, obstacles)
+    if own is not None or not (mission.beyond_free_space or obstacles is not None):
+        channel = radio if own is None else own
+        return MissionRadio(channel, belief, TrueLinks(radio=radio))
+    composed = ComposedChannel(
+        _law(mission, radio, obstacles),
+        _reception(mission, radio),
+        shadowing_db=mission.shadowing_db,
+        shadowing_distance_m=mission.shadowing_distance_m,
+    )
+    return MissionRadio(composed, belief, TrueLinks(radio=radio, channel=composed))
 
 
-def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None) -> Belief:
+def _belief(mission: Mission, obstacles: Obstacles | None) -> Belief:
     """Return what the mission grants to know of its channel."""
-    known = obstacles if mission.grants("map") else None
+    radio, known = radio_of(mission), obstacles if mission.grants("map") else None
     if mission.beyond_free_space and mission.grants("statistics"):
         return Belief(
             radio=radio,

@@ -102,7 +102,7 @@ def incoming_at(air: Air, j: int) -> Incoming:
 
 
 @compiled()
-def transmit(air: Air, i: int, j: int, signal: float, interference: float) -> None:
+def add_to_air(air: Air, i: int, j: int, signal: float, interference: float) -> None:
     """Add i's packet to the air at j; powers as in `add_packet`."""
     incoming = add_packet(incoming_at(air, j), i, signal, interference)
     air.total[j], air.strongest[j], air.sender[j] = incoming

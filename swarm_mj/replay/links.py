@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
 
-from swarm_mj.radio.composed import ComposedChannel, strong_groups
+from swarm_mj.radio.composed import strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.replay import palette
 from swarm_mj.simulation.swarm import Swarm
@@ -152,8 +152,8 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     There is nothing to compare in free space, where the belief is right, and in a user's own
     channel, whose mean powers are unknown.
     """
-    channel = swarm.channel
-    if not isinstance(channel, ComposedChannel):
+    channel = swarm.truth.channel
+    if channel is None:
         return None
     mission, position_m = swarm.mission, swarm.states.position_m[index]
     true_mw = channel.mean_powers_mw(position_m, index)

@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import NUMBERS, LinkRows, Points, shades
-from swarm_mj.replay.palette import Colour, dim
+from swarm_mj.replay.palette import PACKETS, Colour, dim
 from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
@@ -48,9 +48,9 @@ LAYERS = {
     "arena/belief/error": EntityStyle(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
     "arena/belief/ring": EntityStyle(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
     "arena/tree": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
-    "arena/radio/overheard": EntityStyle(rr.LineStrips2D, dim(palette.OVERHEARD, 0.6), 0.7, 10.0),
+    "arena/radio/overheard": EntityStyle(rr.LineStrips2D, PACKETS["overheard"].colour, 0.7, 10.0),
     "arena/radio/heard": EntityStyle(rr.LineStrips2D, palette.BROADCAST, 1.0, 18.0),
-    "arena/radio/unanswered": EntityStyle(rr.Arrows2D, dim(palette.ANSWERED, 0.6), 1.2, 18.0),
+    "arena/radio/unanswered": EntityStyle(rr.Arrows2D, PACKETS["unanswered"].colour, 1.2, 18.0),
     "arena/radio/lost/rest": EntityStyle(rr.LineStrips2D, dim(palette.LOST, 0.5), 0.7, 18.0),
     "arena/radio/lost": EntityStyle(rr.Arrows2D, palette.LOST, 1.8, 19.0),
     "arena/radio/delivered": EntityStyle(rr.Arrows2D, palette.DELIVERED, 2.0, 20.0),
@@ -72,7 +72,7 @@ LAYERS = {
     "scene/world/others/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
     **{
         f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, style.colour, 1.0)
-        for fate, style in palette.PACKETS.items()
+        for fate, style in PACKETS.items()
     },
 }
 

@@ -28,7 +28,6 @@ from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.packets import Packet, fitting, packet_of, with_room
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowProtocol
-from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.obstruction import blocked
@@ -70,7 +69,7 @@ class Swarm:
         self.scene = own.scene
         self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
         radio = mission_radio(mission, self._physics.obstacles, own.channel)
-        self.channel, self.belief, self._truth = radio
+        self.channel, self.belief, self.truth = radio
         is_tasks = own.controller is None
         self.controller: Controller = controller_of(mission) if is_tasks else own.controller
         self._costed = costed(self.controller)
@@ -106,15 +105,14 @@ class Swarm:
 
     def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
-        mission, channel = self.mission, self.channel
+        mission, composed = self.mission, self.truth.channel
         has_obstacles = self._physics.obstacles is not None
-        is_asked = isinstance(channel, ComposedChannel)
         return connected_positions(
             num_robots=mission.num_robots,
             half_side_m=mission.half_side_m,
             range_m=mission.range_m,
             rng=rng,
-            largest_part_at=partial(channel.largest_part, mission=b) if is_asked else None,
+            largest_part_at=partial(composed.largest_part, mission=b) if composed else None,
             is_blocked_at=self._is_blocked if has_obstacles or mission.collide else None,
             keeps_largest=has_obstacles,
         )
@@ -162,7 +160,7 @@ class Swarm:
         room = packet.num_entries
         # A policy's type says what it may know: a centre the truth, robots what they believe.
         if isinstance(policy, CentralisedPolicy):
-            policy.inform(self._truth)
+            policy.inform(self.truth)
         elif isinstance(policy, DecentralisedPolicy):
             policy.inform(self.belief)
         else:

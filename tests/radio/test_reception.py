@@ -7,6 +7,7 @@ from scipy.stats import norm
 from swarm_mj.radio.reception import (
     Incoming,
     add_packet,
+    add_to_air,
     decode_probability,
     decoded,
     incoming_at,
@@ -14,7 +15,6 @@ from swarm_mj.radio.reception import (
     received_power,
     silent_air,
     sinr,
-    transmit,
 )
 
 
@@ -60,8 +60,8 @@ def test_eq4_a_packet_decodes_beside_all_others_by_hand():
 
 def test_the_air_holds_all_packets_at_every_receiver():
     air = silent_air(3)
-    transmit(air, 1, 0, 2.0, 3.0)
-    transmit(air, 2, 0, 4.0, 5.0)
+    add_to_air(air, 1, 0, 2.0, 3.0)
+    add_to_air(air, 2, 0, 4.0, 5.0)
     assert [incoming_at(air, j) for j in range(3)] == [(8.0, 4.0, 2), (0.0, 0.0, 1), (0.0, 0.0, 2)]
 
 

@@ -52,6 +52,7 @@ class Planner(BroadcastPolicy):
         "its buffer, the clock, common orders, the area, its prior knowledge of the radio; and "
         "snapshots of the team in packets"
     )
+    payload = "snapshots"  # two, taken earlier
 
     def __init__(self, mission: Mission, settings: PlannerSettings | None = None) -> None:
         """Prepare the policy for the mission's team, in free space unless it is informed otherwise.
@@ -69,11 +70,6 @@ class Planner(BroadcastPolicy):
             )
         self._mission, self._settings = mission, settings or PlannerSettings()
         self._belief = Belief(radio=radio_of(mission))
-
-    @property
-    def payload(self) -> str:
-        """Packets carry two snapshots of the team, taken earlier."""
-        return "snapshots"
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
         """Return those of the snapshots; arguments as in `Policy.payload_fields`."""

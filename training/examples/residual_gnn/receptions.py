@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.radio.power_law import PowerLaw, write_powers
-from swarm_mj.radio.reception import NOBODY, Air, decoded, incoming_at, transmit
+from swarm_mj.radio.reception import NOBODY, Air, add_to_air, decoded, incoming_at
 from swarm_mj.system.compiled import compiled
 
 
@@ -45,7 +45,7 @@ def predict_receptions(
             write_powers(o, position_m, law, power)
             for j in range(power.shape[0]):
                 if j != o:
-                    transmit(Air(total, strongest, sender), o, j, power[j], power[j])
+                    add_to_air(Air(total, strongest, sender), o, j, power[j], power[j])
 
 
 @compiled()
