@@ -132,11 +132,6 @@ def slot_bytes(mission: Mission) -> int | None:
     return math.floor(round(bits / BITS_PER_BYTE, 6))
 
 
-def least_bit_rate(num_bytes: int, mission: Mission) -> float:
-    """Return the bit rate at which a slot holds these bytes [bit/s]."""
-    return num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
-
-
 def bits_per_second(rate: float) -> str:
     """Return a bit rate in words, by the usual prefix."""
     for prefix, unit in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
@@ -151,33 +146,38 @@ def fits(packet: Packet, mission: Mission) -> bool:
     return capacity is None or packet.num_bytes <= capacity
 
 
+def check_fits(
+    what: str, packet: Packet, mission: Mission, *, why: str = "", otherwise: str = ""
+) -> None:
+    """Raise ValueError unless a slot holds a packet; the rest completes the message."""
+    rate, capacity = mission.bit_rate, slot_bytes(mission)
+    if rate is not None and capacity is not None and packet.num_bytes > capacity:
+        needed = packet.num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
+        least = math.ceil(round(needed, 6))
+        raise ValueError(
+            f"{what} {packet.num_bytes:,} bytes{why}, but a slot holds {capacity:,} bytes at "
+            f"{bits_per_second(rate)}; choose a bit rate of {least} or more{otherwise}"
+        )
+
+
 def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
     """Return a policy's whole packet with as many entries as a slot of the mission holds.
 
     Raises ValueError if that is less than the payload and one entry.
     """
-    rate, capacity = mission.bit_rate, slot_bytes(mission)
-    if rate is None or capacity is None or fits(packet, mission):
+    capacity = slot_bytes(mission)
+    if capacity is None or fits(packet, mission):
         return packet
     least = replace(packet, num_entries=1)
-    if least.num_bytes > capacity:
-        raise ValueError(
-            f"packets of {policy} need {least.num_bytes} bytes for a single entry, but a slot "
-            f"holds {capacity} bytes at {bits_per_second(rate)}; choose a bit rate of "
-            f"{least_bit_rate(least.num_bytes, mission):g} or more"
-        )
+    check_fits(f"packets of {policy} need", least, mission, why=" for a single entry")
     spare = BITS_PER_BYTE * (capacity - least.num_bytes)
     return replace(packet, num_entries=1 + spare // _num_bits(packet.entry))
 
 
 def check_whole(what: str, mission: Mission) -> None:
     """Raise ValueError, naming what needs it, unless a slot holds a whole buffer."""
-    packet = packet_of(mission)
-    if fitting(packet, mission, "T, M and P").num_entries < mission.num_robots:
-        raise ValueError(
-            f"{what} requires unfragmented packets of {packet.num_bytes} bytes, but a slot "
-            f"holds {slot_bytes(mission)} bytes; choose a higher bit rate, or fewer robots"
-        )
+    needs = f"{what} requires unfragmented packets of"
+    check_fits(needs, packet_of(mission), mission, otherwise=", or fewer robots")
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -1,6 +1,7 @@
 """What packets weigh, what arrives of a buffer at those widths, and which entries are sent."""
 
 import math
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,7 @@ from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.packets import (
     PacketField,
     bits_per_second,
+    check_whole,
     entries_sent,
     fitting,
     packet_of,
@@ -119,6 +121,16 @@ def test_no_room_for_one_entry_is_refused_with_the_rate_that_is_needed():
     message = r"of mine need 16 bytes for a single entry, but a slot holds 15 bytes at 2.4 kbit/s; "
     with pytest.raises(ValueError, match=message + "choose a bit rate of 2560 or more"):
         fitting(packet_of(mission), mission, "mine")
+
+
+def test_the_rate_that_is_said_to_do_does():
+    """10,129 bytes in 150 ms take 540,213.3 bit/s; rounded down, they would not fit."""
+    mission = paper(num_robots=1000, window_s=0.3, bit_rate=1000.0)
+    with pytest.raises(ValueError, match="choose a bit rate of") as refused:
+        check_whole("credit", mission)
+    (said,) = re.findall(r"rate of (\d+) or more", str(refused.value))
+    assert said == "540214"
+    check_whole("credit", replace(mission, bit_rate=float(said)))
 
 
 def test_rates_are_said_with_the_usual_prefix():

@@ -32,14 +32,7 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, snapshot_fields, take_snapshots
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.packets import (
-    PacketField,
-    bits_per_second,
-    fits,
-    least_bit_rate,
-    packet_of,
-    slot_bytes,
-)
+from swarm_mj.protocol.packets import PacketField, check_fits, packet_of
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
@@ -61,13 +54,8 @@ class Planner(BroadcastPolicy):
             ValueError: The mission's slots do not hold snapshots.
         """
         packet = packet_of(mission, snapshot_fields(mission))
-        if mission.bit_rate is not None and not fits(packet, mission):
-            needed = least_bit_rate(packet.num_bytes, mission)
-            raise ValueError(
-                f"packets of planner need {packet.num_bytes:,} bytes, but a slot holds "
-                f"{slot_bytes(mission):,} bytes at {bits_per_second(mission.bit_rate)}; choose a "
-                f"bit rate of {needed:g} or more, or planner --payload none"
-            )
+        otherwise = ", or planner --payload none"
+        check_fits("packets of planner need", packet, mission, otherwise=otherwise)
         self._mission, self._settings = mission, settings or PlannerSettings()
         self._belief = Belief(radio=radio_of(mission))
 

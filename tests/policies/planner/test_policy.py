@@ -103,7 +103,7 @@ def test_ii_b_snapshots_that_do_not_fit_to_the_byte_are_refused_with_the_ways_ou
     assert policy.packet(mission).num_bytes == 7263
     message = (
         "packets of planner need 7,263 bytes, but a slot holds 7,262 bytes at 1.162 Mbit/s; "
-        "choose a bit rate of 1.16208e+06 or more, or planner --payload none"
+        "choose a bit rate of 1162080 or more, or planner --payload none"
     )
     with pytest.raises(ValueError, match=re.escape(message)):
         make_policy("planner", paper("random-walk", bit_rate=7262 * 160.0))
