@@ -14,6 +14,8 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from rich.console import Console
+
 from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.api.run import Metrics, Run
 from swarm_mj.control.motion import Controller
@@ -42,12 +44,18 @@ SECOND_LOOK_S = 0.5  # memory that others have just freed may still be counted f
 
 
 class Flown(NamedTuple):
-    """The windows flown, and how the flight ended."""
+    """A mission flown, its record if there is one, and how the flight ended."""
 
-    windows: list[WindowRecord]
+    run: Run  # whose log is not made yet
+    recorder: Recorder | None
     code: int  # an exit code
-    ending: str  # why it ended early; empty if it did not
-    wall_s: float
+    ending: str  # why it ended early, and when; empty if it did not
+
+    @property
+    def recorded(self) -> Run:
+        """The run with its log, if it was recorded."""
+        run = self.run
+        return replace(run, log=self.recorder.log(run.config)) if self.recorder else run
 
 
 def fly(
@@ -92,27 +100,28 @@ def fly(
         KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
     """
     mission = mission_of(fly, task, mission_fields)
-    check_observer(observer, mission.num_robots)
     how = {"probability": probability, "is_deterministic": is_deterministic}
     how |= {"features": (features,) if isinstance(features, str) else tuple(features)}
     chosen, name = _policy_of(policy, mission, how)
-    registry.check_used(how["features"], [chosen])
     components = Components(channel=channel, controller=controller, scene=scene)
     way_out = "choose fewer num_robots or num_windows" + (", or record=False" if record else "")
     needed = flight_needs(mission, name, is_recorded=record)
     check_fits(needed, None, way_out, is_forced=False, way_on="")
-    swarm = Swarm(mission, [seed], **components.given)
-    swarm.start(chosen)
-    recorder = Recorder(swarm, ego=observer) if record else None
-    with quiet_console().status("Preparing the swarm ...") as status, compiling(status.update):
-        compile_ahead(mission, name, **how)
-    bar = WorkBar("Flying", mission.num_windows, "windows", console=quiet_console())
-    flown = fly_swarm(swarm, recorder, bar, way_on="")
-    if flown.code != DONE:
-        kept = f"{len(flown.windows)} of {mission.num_windows} windows; these are kept"
-        warnings.warn(f"{flown.ending} after {kept}", stacklevel=2)
-    run = run_of(swarm, flown, name=name, seed=seed, observer=observer, components=components)
-    return replace(run, log=recorder.log(run.config)) if recorder else run
+    flown = fly_mission(
+        mission,
+        chosen,
+        name,
+        how,
+        components,
+        seed=seed,
+        observer=observer,
+        is_recorded=record,
+        console=quiet_console(),
+        way_on="",
+    )
+    if flown.ending:
+        warnings.warn(f"{flown.ending}; these are kept", stacklevel=2)
+    return flown.recorded
 
 
 def mission_of(
@@ -151,17 +160,60 @@ def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     )
 
 
-def fly_swarm(
-    swarm: Swarm, recorder: Recorder | None, bar: WorkBar, *, way_on: str | None
+def fly_mission(
+    mission: Mission,
+    policy: Policy,
+    name: str,
+    how: Mapping[str, Any],
+    components: Components,
+    *,
+    seed: int,
+    observer: int,
+    is_recorded: bool,
+    console: Console,
+    way_on: str | None,
 ) -> Flown:
-    """Fly a swarm, its policy started, from the first window to the last.
+    """Fly a mission from the first window to the last, with a bar on the console.
 
-    `way_on` ends the message that memory ran short; None flies on regardless. Raises MemoryError
-    if memory did not suffice for one window, and ValueError as `rollout` does.
+    The policy is what `make_policy` makes of its name and `how`, or a user's own. `way_on` ends
+    the message that memory ran short; None flies on regardless. Raises MemoryError if memory did
+    not suffice for one window, and ValueError as `Swarm` and `rollout` do.
     """
+    check_observer(observer, mission.num_robots)
+    registry.check_used(how["features"], [policy])
+    with console.status("Preparing the swarm ...") as status, compiling(status.update):
+        swarm = Swarm(mission, [seed], **components.given)
+        swarm.start(policy)
+        recorder = Recorder(swarm, ego=observer) if is_recorded else None
+        compile_ahead(mission, name, **how)
+    bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
+    start_s = time.perf_counter()
+    windows, code, ending = _fly_windows(swarm, recorder, bar, way_on)
+    wall_s = time.perf_counter() - start_s
+    config = {
+        **asdict(mission),
+        "policy": name,
+        **policy.parameters,
+        "packet_bytes": policy.packet(mission).num_bytes,
+        "seed": int(seed),  # NumPy's numbers are no JSON
+        "observer": int(observer),
+        "version": version(),
+        "commit": commit(),
+        **components.names,
+    }
+    numbers = flight_numbers(mission, policy, summarise(windows))
+    numbers |= {"wall_seconds": wall_s, "interrupted": code != DONE}
+    run = Run(mission=mission, config=config, summary=Metrics(numbers), windows=tuple(windows))
+    when = f"{ending} after {len(windows)} of {mission.num_windows} windows" if ending else ""
+    return Flown(run=run, recorder=recorder, code=code, ending=when)
+
+
+def _fly_windows(
+    swarm: Swarm, recorder: Recorder | None, bar: WorkBar, way_on: str | None
+) -> tuple[list[WindowRecord], int, str]:
+    """Return the windows flown, an exit code and why they are not all; MemoryError if none."""
     flown: list[WindowRecord] = []
     code, ending = FAILED, "Out of memory"  # unless it ends otherwise, below
-    start_s = time.perf_counter()
     with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
         for window in rollout(swarm):
             if recorder:
@@ -180,8 +232,7 @@ def fly_swarm(
             code, ending = DONE, ""
     if not flown:
         raise MemoryError
-    wall_s = time.perf_counter() - start_s
-    return Flown(windows=flown, code=code, ending=ending, wall_s=wall_s)
+    return flown, code, ending
 
 
 def compile_ahead(mission: Mission, policy_name: str, **how: Any) -> None:
@@ -198,28 +249,6 @@ def compile_ahead(mission: Mission, policy_name: str, **how: Any) -> None:
         policy_name, how = "tdma", {}
     policy = registry.make_policy(policy_name, smallest, **how)
     summarise(rollout(Swarm(smallest, [0]), policy))
-
-
-def run_of(
-    swarm: Swarm, flown: Flown, *, name: str, seed: int, observer: int, components: Components
-) -> Run:
-    """Return a swarm's mission, flown, as a `Run`; the config is everything that makes it again."""
-    mission, policy = swarm.mission, swarm.policy
-    config = {
-        **asdict(mission),
-        "policy": name,
-        **policy.parameters,
-        "packet_bytes": policy.packet(mission).num_bytes,
-        "seed": seed,
-        "observer": observer,
-        "version": version(),
-        "commit": commit(),
-        **components.names,
-    }
-    numbers = flight_numbers(mission, policy, summarise(flown.windows))
-    numbers |= {"wall_seconds": flown.wall_s, "interrupted": flown.code != DONE}
-    windows = tuple(flown.windows)
-    return Run(mission=mission, config=config, summary=Metrics(numbers), windows=windows)
 
 
 def _policy_of(

@@ -11,24 +11,21 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.fly import compile_ahead, flight_needs, fly_swarm, run_of
+from swarm_mj.api.fly import flight_needs, fly_mission
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import output_option
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.replay.recorder import Recorder, check_observer
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
-from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.compiled import compiling
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import is_installed, missing, need
-from swarm_mj.system.terminal import WorkBar, plain_console, this_command
+from swarm_mj.system.terminal import plain_console, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 REPLAYS = Path("replays")
@@ -72,48 +69,37 @@ def run(options: FlyOptions) -> int:
     """Run the command; return its exit code."""
     mission = options.mission
     (asked,) = registry.with_payload([options.policy], options.payload)
-    name = registry.flown_name(asked, mission)
-    check_observer(options.observer, mission.num_robots)
-    options = replace(options, policy=name)
+    options = replace(options, policy=registry.flown_name(asked, mission))
     path = _replay_path(options)
     _check_machine(options, path)
-    policy = registry.make_policy(name, mission, **options.how)
-    components = options.components.made(mission)
-    registry.check_used(options.features, [policy])
     console = Console(stderr=True, highlight=False)
-    with console.status("Preparing the swarm ...") as status, compiling(status.update):
-        compile_ahead(mission, name, **options.how)
-        swarm = Swarm(mission, [options.seed], **components.given)
-        swarm.start(policy)
-        recorder = Recorder(swarm, ego=options.observer) if path else None
+    flown = fly_mission(
+        mission,
+        registry.make_policy(options.policy, mission, **options.how),
+        options.policy,
+        options.how,
+        options.components,
+        seed=options.seed,
+        observer=options.observer,
+        is_recorded=path is not None,
+        console=console,
+        way_on=None if options.yes else "; --yes flies on all the same",
+    )
     for note in notes_on(mission):
         console.print(note)
-    bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
-    way_on = None if options.yes else "; --yes flies on all the same"
-    flown = fly_swarm(swarm, recorder, bar, way_on=way_on)
     with deferred_interrupt(), ExitStack() as stack:
-        run = run_of(
-            swarm,
-            flown,
-            name=name,
-            seed=options.seed,
-            observer=options.observer,
-            components=options.components,
-        )
         # The stack unwinds in reverse: the replay is written even if the summary fails, and the
         # table is printed in any case.
-        stack.callback(lambda: plain_console().print(run.table()))
+        stack.callback(lambda: plain_console().print(flown.run.table()))
         stack.enter_context(console.status("Writing ..."))
-        if path and recorder:
-            stack.callback(lambda: replace(run, log=recorder.log(run.config)).save(path))
+        if path:
+            stack.callback(lambda: flown.recorded.save(path))
         if options.json:
-            write_json(options.json, run.report(path))
+            write_json(options.json, flown.run.report(path))
     for label, line in _next_commands(options, path):
         plain_console().print(f"{label:18}{line}")
-    if flown.code != DONE:
-        console.print(
-            f"{flown.ending} after {len(flown.windows)} of {mission.num_windows} windows."
-        )
+    if flown.ending:
+        console.print(f"{flown.ending}.")
         return flown.code
     return run_viewer(view_command(path)) if options.view and path else DONE
 

@@ -211,7 +211,7 @@ def test_a_kill_at_any_step_leaves_what_was_or_what_is_new(forks, tmp_path, reco
 FLY_AND_SIGNAL = """
 import os, sys
 from swarm_mj.cli import fly, main
-fsync, run = os.fsync, fly.fly_swarm
+fsync, run = os.fsync, fly.fly_mission
 def told(number):
     os.kill(os.getpid(), int(sys.argv[1]))
     fsync(number)
@@ -219,7 +219,7 @@ def flown(*arguments, **options):
     done = run(*arguments, **options)
     os.fsync = told
     return done
-fly.fly_swarm = flown
+fly.fly_mission = flown
 sys.exit(main(sys.argv[2:]))
 """
 
