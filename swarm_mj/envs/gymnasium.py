@@ -22,8 +22,12 @@ from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
 from swarm_mj.replay.view import has_display
 
 MODES = ("rgb_array", "human")
-RENDERING: dict[str, Any] = {"render_modes": list(MODES), "render_fps": 10}  # 100 ms a window
 WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
+
+
+def rendering(mission: Mission, modes: Sequence[str]) -> dict[str, Any]:
+    """Return an environment's metadata: how it can be drawn, and windows a second."""
+    return {"render_modes": list(modes), "render_fps": 1.0 / mission.window_s}
 
 
 def modes_here() -> list[str]:
@@ -80,7 +84,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     without a seed it begins another one, drawn from the last seed given.
     """
 
-    metadata = RENDERING
+    metadata = rendering(Mission(), MODES)
     _spec: EnvSpec | None = None
 
     def __init__(
@@ -90,7 +94,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_team_batch(mission, **options)
         self._screen, self.render_mode = Screen(render_mode), render_mode
-        self.metadata = {**RENDERING, "render_modes": modes_here()}
+        self.metadata = rendering(self.batch.mission, modes_here())
         self.observation_space, self.action_space = team_spaces(self.batch)
 
     @property

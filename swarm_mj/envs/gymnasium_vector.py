@@ -5,6 +5,7 @@ Missions that begin together are one batch, played as one swarm. A mission that 
 """
 
 from collections.abc import Sequence
+from numbers import Number
 from typing import Any, cast
 
 import numpy as np
@@ -13,11 +14,19 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space, create_empty_array
 from jaxtyping import Int, UInt8
 
-from swarm_mj.envs.gymnasium import RENDERING, Screen
-from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
+from swarm_mj.envs.gymnasium import Screen, rendering
+from swarm_mj.envs.mission_batch import (
+    Info,
+    MissionBatch,
+    Observation,
+    seed_or_next,
+    seeds_from,
+)
 from swarm_mj.envs.options import check_count, check_reset, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.system.fields import did_you_mean
+
+MODES = ("rgb_array",)  # a window on the screen would show one mission of many
 
 
 class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
@@ -27,7 +36,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     `options={"reset_mask": mask}`, which begins the missions where the mask is True.
     """
 
-    metadata: dict[str, Any] = {**RENDERING, "render_modes": ["rgb_array"]}  # noqa: RUF012
+    metadata: dict[str, Any] = rendering(Mission(), MODES)
 
     def __init__(
         self,
@@ -44,11 +53,10 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         check_count("num_envs", num_envs)
         self.num_envs, self._mode = num_envs, _mode_of(autoreset_mode)
         self.autoreset_mode = self._mode  # where TorchRL looks for it
-        self.metadata = {**self.metadata, "autoreset_mode": self._mode}
-        self._screen = Screen(render_mode, self.metadata["render_modes"])
-        self.render_mode = render_mode
+        self._screen, self.render_mode = Screen(render_mode, MODES), render_mode
         self._mission, self._options = mission, options
         batch = make_team_batch(mission, num_envs, **options)
+        self.metadata = rendering(batch.mission, MODES) | {"autoreset_mode": self._mode}
         # Of each environment: the batch that flies it, and its row there.
         self._batches = np.full(num_envs, batch, dtype=object)
         self._rows = np.arange(num_envs)
@@ -84,9 +92,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
                 f"reset_mask must be {self.num_envs} bools, one an environment and not all False, "
                 f"not {mask!r}"
             )
-        seeds = [None] * self.num_envs if seed is None else seed
-        if isinstance(seeds, int):
-            seeds = range(seeds, seeds + self.num_envs)
+        is_first = seed is None or isinstance(seed, Number)
+        seeds: Any = seeds_from(cast("int | None", seed), self.num_envs) if is_first else seed
         if len(seeds) != self.num_envs:
             raise ValueError(
                 f"seed must be one number, or {self.num_envs}, one an environment, not {seed!r}"

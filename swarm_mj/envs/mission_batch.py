@@ -182,6 +182,14 @@ class MissionBatch:
         return {name: values[0] for name, values in self.observation.items()}, info
 
 
+def seeds_from(first: int | None, number: int) -> list[int | None]:
+    """Return seeds that count on from the first one, which stays as it is; None for missions drawn.
+
+    What is no whole number reaches the checks of seeds, rather than being made one.
+    """
+    return [first, *(None if first is None else first + n for n in range(1, number))]
+
+
 def seed_or_next(seed: int | None, rng: np.random.Generator) -> int:
     """Return the seed; if it is None, draw another mission's, which no evaluation has."""
     return int(rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED)) if seed is None else seed

@@ -7,7 +7,7 @@ from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
 from jaxtyping import Float32, UInt8
 
-from swarm_mj.envs.gymnasium import RENDERING, Screen, modes_here
+from swarm_mj.envs.gymnasium import MODES, Screen, modes_here, rendering
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import make_batch, robot_spaces
 from swarm_mj.envs.truth import truth, truth_space
@@ -22,7 +22,7 @@ except ModuleNotFoundError as error:
     ) from error
 
 Action = int | np.integer[Any]
-METADATA: dict[str, Any] = {"name": "swarm_mj_v0", **RENDERING}
+NAME = {"name": "swarm_mj_v0"}
 
 
 class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
@@ -32,7 +32,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     seed s; without a seed it begins another one, drawn from the last seed given.
     """
 
-    metadata = METADATA
+    metadata: dict[str, Any] = NAME | rendering(Mission(), MODES)
 
     def __init__(
         self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
@@ -41,7 +41,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
         self._screen, self.render_mode = Screen(render_mode), render_mode
-        self.metadata = {**METADATA, "render_modes": modes_here()}
+        self.metadata = NAME | rendering(self.batch.mission, modes_here())
         self.possible_agents = [f"robot_{i}" for i in range(self.batch.mission.num_robots)]
         self.agents: list[str] = []
         self._robot = {agent: i for i, agent in enumerate(self.possible_agents)}

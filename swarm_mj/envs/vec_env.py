@@ -13,7 +13,7 @@ from jaxtyping import Bool
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
-from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
+from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next, seeds_from
 
 AGENTS = ("robot", "team")  # what an environment is
 
@@ -42,7 +42,7 @@ class SwarmVecEnv(VecEnv):
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Let the next reset begin the missions of seeds from this one on; return each one's."""
         missions = [batch for batch in self.batches for _ in range(batch.num_missions)]
-        self._given = [None if seed is None else seed + b for b in range(len(missions))]
+        self._given = seeds_from(seed, len(missions))
         self._rngs = [seeding.np_random(each)[0] for each in self._given]
         per_mission = [self._per_mission(batch) for batch in missions]
         return np.repeat(np.array(self._given, dtype=object), per_mission).tolist()

@@ -9,8 +9,6 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, get_args
 
-import numpy as np
-
 from swarm_mj.system.fields import FieldOf, as_typed, check, check_names, setting
 
 Preset = Literal["paper", "reference", "indoor", "urban", "open-field"]
@@ -235,9 +233,6 @@ class Mission:
                 "exact physics knows no collisions, so robots cannot collide in it; choose "
                 "physics contact, or let them pass through each other"
             )
-        for name, value in vars(self).items():
-            if isinstance(value, np.generic):  # which JSON does not know
-                object.__setattr__(self, name, value.item())
 
     @property
     def side_m(self) -> float:

@@ -13,6 +13,8 @@ from numbers import Integral, Real
 from types import NoneType
 from typing import Any, ClassVar, Literal, Protocol, get_args, get_origin, runtime_checkable
 
+import numpy as np
+
 # What an annotation admits, NumPy's numbers included, and how a message calls it.
 KINDS: dict[Any, tuple[type, str]] = {
     int: (Integral, "a whole number"),
@@ -62,14 +64,18 @@ def same_as(owner: type[Any], name: str) -> FieldOf:
 def check(settings: Settings) -> None:
     """Raise ValueError unless every field's value is of its kind and in its range or choices.
 
-    The message names the field, what is allowed, and the value.
+    The message names the field, what is allowed, and the value. NumPy's numbers, which JSON does
+    not know, become Python's.
     """
     for spec in fields(settings):
         value = getattr(settings, spec.name)
         if value is None and NoneType in get_args(spec.type):
             continue
-        for each in value if isinstance(value, tuple) else (value,):
+        given = value if isinstance(value, tuple) else (value,)
+        for each in given:
             check_value(spec, each)
+        plain = tuple(each.item() if isinstance(each, np.generic) else each for each in given)
+        object.__setattr__(settings, spec.name, plain if isinstance(value, tuple) else plain[0])
 
 
 def kind_of(spec: Field[Any]) -> object:

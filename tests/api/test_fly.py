@@ -6,6 +6,8 @@ tests/faults/test_fit.py compares estimates with peaks.
 import json
 import math
 import signal
+import subprocess
+import sys
 from types import SimpleNamespace
 
 import pytest
@@ -67,6 +69,26 @@ def test_it_is_what_the_command_line_flies(here, keywords, options):
     del ours["wall_seconds"], told["wall_seconds"]
     assert ours == told
     assert (run.summary.packets_heard == 0) == ("channel" in keywords)
+
+
+NUMPYS = """
+import numpy as np
+import swarm_mj
+seed, observer = np.arange(8)[[7, 2]]
+short = {"num_robots": np.int16(6), "num_windows": 4, "range_ratio": np.float32(0.5)}
+swarm_mj.fly(policy="tdma", seed=seed, observer=observer, **short).save("a.json")
+swarm_mj.evaluate("tdma", num_missions=np.int32(2), seed=seed, **short).save("b.json")
+"""
+
+
+def test_numpys_numbers_can_be_saved(here):
+    """In a Python without the tests' checks of types, which admit Python's numbers only."""
+    subprocess.run([sys.executable, "-c", NUMPYS], check=True, cwd=here)
+    config = json.loads((here / "a.json").read_text())["config"]
+    names = ("seed", "observer", "num_robots", "range_ratio")
+    assert [config[name] for name in names] == [7, 2, 6, 0.5]
+    (result,) = json.loads((here / "b.json").read_text())["results"]
+    assert (result["episodes"], result["seed"]) == (2, 7)
 
 
 def test_a_mission_and_a_policy_of_ones_own_fly():

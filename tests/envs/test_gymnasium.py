@@ -4,6 +4,7 @@ import subprocess
 import sys
 import warnings
 from dataclasses import replace
+from functools import partial
 
 import gymnasium
 import numpy as np
@@ -49,6 +50,12 @@ def test_render_modes_are_those_that_work_here(monkeypatch):
         monkeypatch.setenv("DISPLAY", display)
         for env in (SwarmEnv(**SMALL), parallel_env(**SMALL)):
             assert env.metadata["render_modes"] == modes
+
+
+def test_videos_last_as_long_as_the_mission():
+    for env in (SwarmEnv, parallel_env, partial(SwarmVectorEnv, 2)):
+        assert env(**SMALL).metadata["render_fps"] == 10
+        assert env(window_s=0.25, **SMALL).metadata["render_fps"] == 4
 
 
 def test_its_specification_says_when_a_mission_is_cut_off():

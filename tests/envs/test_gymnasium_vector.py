@@ -116,6 +116,7 @@ def test_without_autoreset_an_ended_mission_is_refused():
     ("seed", "options", "message"),
     [
         ([1, 2], {}, "seed must be one number, or 3"),
+        (True, {}, r"seeds must be .* integers from 0 to .*, not \[True, 2, 3\]"),
         (None, {"reset_mask": [True, True]}, "reset_mask must be 3 bools"),
         (None, {"reset_mask": np.zeros(3, dtype=bool)}, "not all False"),
         (None, {"reset_mask": np.ones(3)}, "reset_mask must be 3 bools"),

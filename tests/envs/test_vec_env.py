@@ -36,6 +36,9 @@ def test_a_models_own_seed_wins():
     PPO("MultiInputPolicy", env, seed=7, n_steps=2, batch_size=6)
     env.reset()
     assert [info["seed"] for info in env.reset_infos] == [7, 8, 9]
+    env.seed(True)
+    with pytest.raises(ValueError, match=r"not \[True, 2, 3\]"):
+        env.reset()
 
 
 def test_after_the_last_window_another_mission_begins():

@@ -1,6 +1,7 @@
 """Values that are checked where they are declared."""
 
-from dataclasses import dataclass
+import json
+from dataclasses import asdict, dataclass
 from typing import Literal
 
 import numpy as np
@@ -47,6 +48,9 @@ def test_others_are_named_with_what_is_allowed(values, complaint):
 def test_sound_values_pass_and_the_kind_is_that_of_a_single_value():
     Kettle(litres=np.float64(0.1), cups=(1, 6), minutes=60, colour="blue", is_on=True)
     Kettle(litres=3, cups=(), minutes=None)
+    numpys = Kettle(litres=np.float32(0.5), cups=(np.int64(1), 6), minutes=np.int16(3))
+    plain = Kettle(litres=0.5, cups=(1, 6), minutes=3)
+    assert json.dumps(asdict(numpys)) == json.dumps(asdict(plain))
     kinds = {name: kind_of(spec) for name, spec in Kettle.__dataclass_fields__.items()}
     assert kinds == {"litres": float, "cups": int, "minutes": int, "colour": str, "is_on": bool}
 
