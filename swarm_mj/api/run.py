@@ -34,8 +34,6 @@ if TYPE_CHECKING:  # each is slow to import, and flights do without
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-    from swarm_mj.replay.footage import Footage
-
 AGE = "age of information: how old a robot's news of another is, over all pairs; less is better"
 ELSEWHERE = (
     "run.show() plays a video in a notebook. Here, run.save('flight.mp4') writes the video, and "
@@ -194,13 +192,15 @@ class Run:
         how = {"embed": True, "mimetype": "video/mp4", "html_attributes": "controls loop"}
         display(Video(data=content, **how))
 
-    def footage(self) -> "Footage":
+    def footage(self) -> Log:
         """Return the pictures' data; `rendering.video.make_video` puts two side by side.
 
         Raises:
             ValueError: Nothing was recorded.
         """
-        return self._recorded()
+        if self.log is None:
+            raise ValueError("nothing was recorded that could be shown; fly with record=True")
+        return self.log
 
     def report(self, replay: Path | None = None) -> dict[str, Any]:
         """Return config and summary, as `swarm-mj fly --json` writes them."""
@@ -221,7 +221,7 @@ class Run:
         check_outputs(Output("the file", path, ENDINGS))
         match path.suffix.lower():
             case ".rrd":
-                log = self._recorded()
+                log = self.footage()
                 need("rerun", "a replay")
                 from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
@@ -237,11 +237,6 @@ class Run:
             case ending:
                 write_bytes(path, self._film(ending))
         return path
-
-    def _recorded(self) -> Log:
-        if self.log is None:
-            raise ValueError("nothing was recorded that could be shown; fly with record=True")
-        return self.log
 
     def _film(self, ending: str) -> bytes:
         """Return the content of a video file, as `swarm-mj replay --video` makes it."""

@@ -6,7 +6,7 @@ the last of `--robots 10 --robots 20`.
 
 import argparse
 import sys
-from collections.abc import Callable, Container, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import MISSING, Field, field, fields
 from functools import partial
@@ -36,7 +36,7 @@ BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a nu
 class Parser(argparse.ArgumentParser):
     """A parser that complains in one line, and whose help may leave out what few people need."""
 
-    rare: frozenset[str] = frozenset()  # destinations that only `--help-all` shows
+    rare: Mapping[argparse.Action, str | None] = MappingProxyType({})  # what `--help-all` says
 
     def format_help(self) -> str:
         """Return the help; its last line says how to see the options that it leaves out."""
@@ -45,7 +45,7 @@ class Parser(argparse.ArgumentParser):
         titles = [
             str(group.title).partition(",")[0]
             for group in self._action_groups
-            if group._group_actions and {each.dest for each in group._group_actions} <= self.rare
+            if group._group_actions and set(group._group_actions) <= self.rare.keys()
         ]
         left_out = f"{self.prog} --help-all shows {len(self.rare)} more: {', '.join(titles)}"
         return f"{super().format_help()}\n{left_out}\n"
@@ -71,21 +71,14 @@ class _HelpAll(argparse.Action):
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
         """Print the help with the options that most people do not need; exit."""
         assert isinstance(parser, Parser)
-        parser.rare, parser.formatter_class = frozenset(), _FORMATTER
+        for action, text in parser.rare.items():
+            action.help = text
+        parser.rare = {}
         parser.print_help()
         parser.exit()
 
 
 class _Formatter(argparse.HelpFormatter):
-    def __init__(self, *given: Any, rare: Container[str] = (), **more: Any) -> None:
-        super().__init__(*given, **more)
-        self._rare = rare
-
-    def add_argument(self, action: argparse.Action) -> None:
-        """Add an option, unless the help leaves it out."""
-        if action.dest not in self._rare:
-            super().add_argument(action)
-
     def _format_action_invocation(self, action: argparse.Action) -> str:
         """Return a flag without those that it had in earlier releases."""
         shown = copy(action)
@@ -98,9 +91,6 @@ class _Formatter(argparse.HelpFormatter):
         if action.nargs == "+":
             return f"{action.metavar} ..."
         return super()._format_args(action, default_metavar or "")
-
-
-_FORMATTER = partial(_Formatter, max_help_position=26)
 
 
 def nested(
@@ -173,11 +163,10 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         usage=" ".join([prog, *needed, "[OPTIONS]"]),
         description=summary,
         epilog=getattr(kind, "EPILOG", None),
-        formatter_class=_FORMATTER,
+        formatter_class=partial(_Formatter, max_help_position=26),
         argument_default=argparse.SUPPRESS,
     )
     if rare := _rare(kind, options):
-        parser.rare, parser.formatter_class = rare, partial(_FORMATTER, rare=rare)
         about = "show all options and exit"
         parser.add_argument("--help-all", dest=HELP_ALL, action=_HelpAll, nargs=0, help=about)
     groups: dict[str, Any] = {"": parser}
@@ -186,6 +175,9 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         if heading not in groups:
             groups[heading] = parser.add_argument_group(heading)
         _add(groups[heading], spec)
+    parser.rare = {action: action.help for action in parser._actions if action.dest in rare}
+    for action in parser.rare:
+        action.help = argparse.SUPPRESS
     return parser
 
 

@@ -7,7 +7,6 @@ robot's credit is 0.
 
 import copy
 from collections.abc import Callable
-from functools import partial
 from typing import TypeVar
 
 import numpy as np
@@ -44,31 +43,16 @@ def credits_of(
         recipient = of_active(is_active, recipient)
         # Nothing is gained by news of a robot that has failed: it is not counted in the age.
         timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
-    replayed = partial(_replayed, timestamp, position_m, channel, now, is_active)
+
+    def replayed(
+        rows: Int[np.ndarray, "W"], recipient: Int[np.ndarray, "W N"]
+    ) -> Float[np.ndarray, "W"]:
+        """Return the gains of the windows of these missions with other recipients [windows]."""
+        fresh, its = snapshot_channel(channel), None if is_active is None else is_active[rows]
+        return gain(timestamp, position_m[rows], recipient, fresh, now[rows], rows, its)
+
     at_once = isinstance(channel, (FreeSpaceRadio, VaryingChannel))
-    credits_by = _credits_at_once if at_once else _credits_in_turn
-    return credits_by(recipient, replayed)
-
-
-def _replayed(
-    timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N 2"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    is_active: Bool[np.ndarray, "B N"] | None,
-    rows: Int[np.ndarray, "W"],
-    recipient: Int[np.ndarray, "W N"],
-) -> Float[np.ndarray, "W"]:
-    """Return the gains of the windows of these missions with other recipients [windows]."""
-    return gain(
-        timestamp,
-        position_m[rows],
-        recipient,
-        snapshot_channel(channel),
-        now[rows],
-        mission=rows,
-        is_active=None if is_active is None else is_active[rows],
-    )
+    return (_credits_at_once if at_once else _credits_in_turn)(recipient, replayed)
 
 
 def _credits_at_once(
