@@ -6,7 +6,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
-from swarm_mj.policies.stored import save_policy
+from swarm_mj.policies.stored import save_gnn
 
 torch.set_num_threads(1)  # tests share the machine's cores
 
@@ -37,5 +37,5 @@ def tiny_config(network, features="extended", **overrides):
 def save_tiny(path, features="extended", seed=1, **shape):
     """Saves a tiny policy; returns its network."""
     network = tiny_network(features, seed, **shape)
-    save_policy(path, network, tiny_config(network, features))
+    save_gnn(path, network, tiny_config(network, features))
     return network

@@ -25,7 +25,7 @@ from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import reference
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
-from swarm_mj.policies.stored import save_policy
+from swarm_mj.policies.stored import save_gnn
 from swarm_mj.system.fields import setting
 from swarm_mj.system.packages import version
 from swarm_mj.system.reading import read_file
@@ -90,7 +90,7 @@ def store(path: Path, policy: Path) -> None:
         commit=None,
         version=version(),
     )
-    save_policy(policy, network_of(path), config, card=CARD)
+    save_gnn(policy, network_of(path), config, card=CARD)
 
 
 def costs_of(policy: Path, episodes: int, seed: int, num_jobs: int) -> list[float]:

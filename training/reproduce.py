@@ -24,7 +24,7 @@ from experiments import MOST_BYTES, Experiment, Scale, read_experiment, typed
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import parse, script
-from swarm_mj.evaluation.results import Result, read_results, write_csv
+from swarm_mj.evaluation.results import Result, read_results, write_results
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_run
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system import writing
@@ -201,7 +201,7 @@ class Work:
             ({name: row.get(name) for name in CURVE_COLUMNS} for row in table),
         )
         writing.write_csv(trainings, TRAINING_COLUMNS, map(self._training, rows, rows.values()))
-        write_csv(results, list(self._results(rows)))
+        write_results(results, list(self._results(rows)))
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
         """Return a row of the table of trainings."""

@@ -10,9 +10,9 @@ from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.flying import fly_study
-from swarm_mj.evaluation.results import Result, write_csv
+from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
-from swarm_mj.evaluation.summary import Evaluated, summarise, write_evaluated
+from swarm_mj.evaluation.summary import Evaluated, study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
@@ -106,10 +106,7 @@ class Evaluation:
         """
         path = Path(path)
         check_outputs(Output("the file", path, ".csv|.json"))
-        if path.suffix.lower() == ".csv":
-            write_csv(path, self._rows)
-        else:
-            write_evaluated(path, self.results)
+        write_evaluated(path, self.results)
         return path
 
 
@@ -181,7 +178,7 @@ def evaluate(
     costs: dict[int, BatchCosts] = {}
     with memory_errors():
         fly_study(study, costs, num_jobs, None, quiet_console())
-    return Evaluation(mission=mission, results=summarise(study, costs, study.header()))
+    return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
 
 
 def study_needs(study: Study, num_jobs: int) -> Needs:

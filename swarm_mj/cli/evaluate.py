@@ -15,9 +15,9 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.results import Result, write_csv
+from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
-from swarm_mj.evaluation.summary import summarise, write_evaluated
+from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import listed, normalised, stored_policies, with_payload
@@ -122,14 +122,12 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
         console.print(f"{ending} after {flown} of {study.num_missions} missions; {hint}.")
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
-        evaluated = summarise(study, costs, header)
-        results = [each.result for each in evaluated]
-        if options.json:
-            write_evaluated(options.json, evaluated)
-        if options.csv:
-            write_csv(options.csv, results)
+        evaluated = study_results(study, costs, header)
+        for path in filter(None, (options.json, options.csv)):
+            write_evaluated(path, evaluated)
         if kept:
             kept.unlink()
+    results = [each.result for each in evaluated]
     print_results(results, is_wide=options.wide)
     if options.plot:
         _plot(options.plot, results)

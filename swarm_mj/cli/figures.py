@@ -8,8 +8,6 @@ from rich.console import Console
 
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import Result, read_results
-from swarm_mj.mission.components import components_in
-from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import LIBRARIES, YES, Needs, check_fits
@@ -53,7 +51,7 @@ def run(options: FiguresOptions) -> int:
     paths = _paths(options)
     needs = figures_needs(options.results, sum(map(len, paths.values())))
     check_fits(needs, options.out, "draw fewer results at once", is_forced=options.yes)
-    results = [result for path in options.results for result in _papers(path)]
+    results = [result for path in options.results for result in read_results(path)]
     console = plain_console()
     with Console(stderr=True).status("Drawing ...") as status:
         quiet_matplotlib()
@@ -65,7 +63,7 @@ def run(options: FiguresOptions) -> int:
         _check_methods(options.policy, results)
         policy, seed = options.flock_policy, options.flock_seed
         drawn = {}
-        for name in paths:
+        for name in sorted(paths, key=FLOCK.__eq__):  # it flies, and what is refused comes first
             status.update(f"Drawing {name} ...")
             try:
                 if name == FLOCK:
@@ -76,7 +74,7 @@ def run(options: FiguresOptions) -> int:
                 is_last_hope = name == FIGURES[-1] and set(drawn) <= {FLOCK}
                 if options.figure != FIGURES or is_last_hope:
                     raise
-        written = [(drawn[name], path) for name in drawn for path in paths[name]]
+        written = [(drawn[name], path) for name in paths if name in drawn for path in paths[name]]
         for figure, path in written:  # once all are drawn, so that a failure writes none
             status.update(f"Writing {path.name} ...")
             save(figure, path)
@@ -100,25 +98,6 @@ def figures_needs(results: tuple[Path, ...], num_files: int) -> Needs:
     """Return what drawing takes: the results as objects, and files of pictures."""
     read = sum(path.stat().st_size for path in results if path.is_file())
     return Needs(memory=DRAWING + OBJECTS * read, file=PICTURE * num_files)
-
-
-def _papers(path: Path) -> list[Result]:
-    """Read a file's results; raise ValueError for those that the paper's values do not fit."""
-    results = read_results(path)
-    for row, result in enumerate(results, start=1):
-        beyond = components_in(vars(result)).names | {
-            "radio": result.radio,
-            "arena": result.arena,
-            "prior knowledge": result.prior_knowledge,
-        }
-        for kind, name in beyond.items():
-            if name not in (None, OPEN, NOTHING):
-                raise ValueError(
-                    f"figures compare with the paper's values, but row {row} of {path} was flown "
-                    f"with the {kind} {name}; leave such rows out, or chart them with "
-                    f"`swarm-mj evaluate --plot FILE`"
-                )
-    return results
 
 
 def _paths(options: FiguresOptions) -> dict[str, list[Path]]:

@@ -9,9 +9,9 @@ from typing import Any, get_args
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.specification import NOTHING
-from swarm_mj.system import writing
 from swarm_mj.system.fields import FORMER_NAMES, check_value, kind_of
-from swarm_mj.system.reading import read_rows
+from swarm_mj.system.reading import read_json, read_rows
+from swarm_mj.system.writing import write_csv
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -116,6 +116,17 @@ def carries_more(result: Result) -> bool:
     return result.payload not in (None, "none")
 
 
+def config_of(result: Result) -> dict[str, Any]:
+    """Return everything that a result depends on; raise ValueError if that is no JSON object."""
+    try:
+        return read_json(result.config, dict)
+    except ValueError as error:
+        raise ValueError(
+            f"config of {result.policy} must be a JSON object, not {result.config!r:.60}; make "
+            "the results with `swarm-mj evaluate --csv FILE`"
+        ) from error
+
+
 COLUMNS = tuple(spec.name for spec in fields(Result))
 NEEDED = tuple(spec.name for spec in fields(Result) if spec.default is MISSING)
 REPEATED = {spec.name: spec for spec in fields(Mission) if spec.name in COLUMNS}
@@ -145,9 +156,9 @@ def read_results(path: Path) -> list[Result]:
         raise ValueError(f"{error}; make them with `swarm-mj evaluate --csv FILE`") from error
 
 
-def write_csv(path: Path, results: Iterable[Result]) -> None:
+def write_results(path: Path, results: Iterable[Result]) -> None:
     """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell."""
-    writing.write_csv(path, COLUMNS, (asdict(result) for result in results))
+    write_csv(path, COLUMNS, (asdict(result) for result in results))
 
 
 def _result(place: str, row: dict[str, str]) -> Result:

@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.published import published
-from swarm_mj.evaluation.results import COLUMNS, Result
+from swarm_mj.evaluation.results import COLUMNS, Result, write_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import radio_in_words
@@ -45,11 +45,17 @@ class Evaluated:
 
 
 def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
-    """Write `{"results": [...]}` as JSON, replaced if it exists; what does not exist is null."""
-    write_json(path, {"results": [each.row for each in evaluated]})
+    """Write what `write_results` does into a .csv, and what each mission cost, too, into a .json.
+
+    A file that exists is replaced. JSON is `{"results": [...]}`; what does not exist is null.
+    """
+    if path.suffix.lower() == ".csv":
+        write_results(path, [each.result for each in evaluated])
+    else:
+        write_json(path, {"results": [each.row for each in evaluated]})
 
 
-def summarise(
+def study_results(
     study: Study, costs: Mapping[int, BatchCosts], made_by: Mapping[str, Any]
 ) -> list[Evaluated]:
     """Return the results of a study, regime by regime, policy by policy.

@@ -10,7 +10,7 @@ from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
 
@@ -68,13 +68,14 @@ def missions_of(result: Result) -> str:
         "known": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
     }
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
-    failing = result.failure_fraction
-    fate = f", {failing:.0%} of the robots off half-way" if failing else ""
+    fates = ", robots collide" if config_of(result).get("collide") else ""
+    if result.failure_fraction:
+        fates += f", {result.failure_fraction:.0%} of the robots off half-way"
     flown = f"{result.episodes} mission{'s' * (result.episodes != 1)} from seed {result.seed}"
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
         f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g},\nboundary "
-        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fate}, "
+        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fates}, "
         f"{flown}{own}"
     )
 

@@ -17,7 +17,7 @@ from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Accumulator, Choice, Listener, Progress, Row
 from swarm_mj.policies.policy_config import GnnConfig
-from swarm_mj.policies.stored import POLICY, read_policy, save_policy
+from swarm_mj.policies.stored import POLICY, read_policy, save_gnn
 from swarm_mj.system.packages import commit, version
 from swarm_mj.system.writing import owned
 
@@ -89,7 +89,7 @@ class TrainingSession(BaseCallback):
             network, config = init
             policy_of(self.ppo).take_acting_network(network)
             if not own.exists():
-                save_policy(own, network, config)
+                save_gnn(own, network, config)
         self.ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
         self._counted_s = time.monotonic()  # until when time is in the progress
         self._saved_s = -math.inf
@@ -243,4 +243,4 @@ class TrainingSession(BaseCallback):
             commit=commit(),
             version=version(),
         )
-        save_policy(self._folder / POLICY, self._networks[decisions], config)
+        save_gnn(self._folder / POLICY, self._networks[decisions], config)

@@ -41,7 +41,7 @@ class _Metadata:
     card: str
 
 
-def save_policy(
+def save_gnn(
     path: Path, network: "AggregationGnn", config: GnnConfig, card: str | None = None
 ) -> Path:
     """Store a GNN; as `save_weights`, and ValueError if the config is of another network."""

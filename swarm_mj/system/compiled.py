@@ -94,7 +94,7 @@ class _Cache(caching.FunctionCache):
         """
         super().__init__(function)
         file = Path(function.__code__.co_filename)
-        self._cache_file._version += digest(file) + function.__module__
+        self._cache_file._version += sources_digest(file) + function.__module__
 
     def load_overload(self, sig: Any, target_context: Any) -> Any:  # noqa: ANN401 - numba's
         """Load a function without all that numba imports to compile one, which takes 0.5 s."""
@@ -121,7 +121,7 @@ def compiling(say: Callable[[str], object]) -> AbstractContextManager[None]:
     return install_listener("numba:compile", _Count(say))
 
 
-def digest(file: Path) -> str:
+def sources_digest(file: Path) -> str:
     """Return a hash of a file and of all files that it imports, directly or through others.
 
     Those are files of this package, and of the file's own: users compile loops across files, too.

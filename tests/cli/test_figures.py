@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from swarm_mj.cli.figures import figures_needs
-from swarm_mj.evaluation.results import write_csv
+from swarm_mj.evaluation.results import write_results
 
 SYNTHETIC = runpy.run_path(
     str(Path(__file__).parent.parent / "evaluation" / "figures" / "synthetic.py")
@@ -19,7 +19,7 @@ EVERYTHING = SYNTHETIC["everything"]()
 
 @pytest.fixture
 def results(tmp_path):
-    write_csv(tmp_path / "all.csv", EVERYTHING)
+    write_results(tmp_path / "all.csv", EVERYTHING)
     return "all.csv"
 
 
@@ -35,8 +35,8 @@ def test_every_figure_is_drawn_as_vectors_and_as_pixels(succeed, tmp_path, resul
 
 
 def test_only_what_is_asked_for_of_several_files_as_of_one(succeed, tmp_path):
-    write_csv(tmp_path / "one.csv", EVERYTHING[:3])
-    write_csv(tmp_path / "other.csv", EVERYTHING[3:])
+    write_results(tmp_path / "one.csv", EVERYTHING[:3])
+    write_results(tmp_path / "other.csv", EVERYTHING[3:])
     draw = ("figures", "one.csv", "other.csv", "--figure", "fig5", "--out", "a/b")
     succeed(*draw, "--format", "pdf", "svg", "pdf")
     written = sorted(path.name for path in (tmp_path / "a" / "b").iterdir())
@@ -65,7 +65,7 @@ def test_nothing_is_overwritten_unasked_and_nothing_written_when_one_is_in_the_w
 
 
 def test_a_figure_without_points_is_named_with_its_command_and_none_is_written(refusal, tmp_path):
-    write_csv(tmp_path / "some.csv", EVERYTHING[:3])
+    write_results(tmp_path / "some.csv", EVERYTHING[:3])
     line = refusal("figures", "some.csv", "--out", ".", "--figure", "fig4", "fig6")
     assert "fig6 has no points" in line
     assert "swarm-mj evaluate --policy tdma " in line
@@ -73,14 +73,14 @@ def test_a_figure_without_points_is_named_with_its_command_and_none_is_written(r
 
 
 def test_unasked_figures_without_points_are_left_out_unless_all_are(succeed, refusal, tmp_path):
-    write_csv(tmp_path / "rest.csv", [one for one in EVERYTHING if one.task == "stationary"])
+    write_results(tmp_path / "rest.csv", [one for one in EVERYTHING if one.task == "stationary"])
     done = succeed("figures", "rest.csv", "--out", ".", "--format", "svg")
     assert "Wrote fig2.svg fig3.svg fig4.svg" in done.stdout
     assert "Left out fig5, fig6: the results hold no point of them" in done.stdout
     assert len(list(tmp_path.glob("*.svg"))) == 3
     walks = [one for one in EVERYTHING if one.task == "random-walk"]
     elsewhere = [replace(one, task="flocking", range_ratio=0.9) for one in walks]
-    write_csv(tmp_path / "none.csv", elsewhere)
+    write_results(tmp_path / "none.csv", elsewhere)
     assert "fig6 has no points" in refusal("figures", "none.csv", "--out", "x")
 
 
@@ -89,7 +89,7 @@ def test_a_missing_file_a_folder_and_two_presets_are_refused(refusal, tmp_path, 
     (tmp_path / "bad.csv").write_bytes(b"\x00\xff")
     for name in ("missing.csv", "folder", "bad.csv"):
         assert name in refusal("figures", name, "--out", ".")
-    write_csv(tmp_path / "paper.csv", SYNTHETIC["everything"]("paper"))
+    write_results(tmp_path / "paper.csv", SYNTHETIC["everything"]("paper"))
     line = refusal("figures", results, "paper.csv", "--out", ".", "--figure", "fig4")
     assert "presets reference and paper; draw one at a time" in line
 
@@ -116,9 +116,11 @@ KINDS |= {"prior_knowledge": "map,start"}
 def test_results_beyond_the_papers_missions_are_not_drawn_beside_its_own(refusal, tmp_path, kind):
     """Nor those of one's own parts."""
     row = replace(EVERYTHING[2], **{kind: KINDS[kind]})
-    write_csv(tmp_path / "all.csv", [*EVERYTHING[:2], row])
+    write_results(tmp_path / "all.csv", [*EVERYTHING[:2], row])
     line = refusal("figures", "all.csv", "--out", ".")
-    assert f"row 3 of all.csv was flown with the {kind.replace('_', ' ')} {KINDS[kind]}" in line
+    usual = {"arena": "open", "prior_knowledge": "nothing"}.get(kind, "none")
+    assert f"the paper's missions, in which {kind} is {usual}, not {KINDS[kind]} (" in line
+    assert line.endswith("or chart others with `swarm-mj evaluate --plot FILE`")
 
 
 def test_figures_take_more_for_larger_results(tmp_path):

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_csv
+from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_results
 
 TEXTS = {
     "policy": "mst",
@@ -39,12 +39,12 @@ def test_a_csv_comes_back_bit_for_bit(tmp_path):
         some_result(policy="a, b\n'c'", aoi_mean=0.1 + 0.2, age_worst=1e-300),
         some_result(**dict.fromkeys(OPTIONAL)),
     ]
-    write_csv(tmp_path / "new" / "r.csv", results)
+    write_results(tmp_path / "new" / "r.csv", results)
     assert read_results(tmp_path / "new" / "r.csv") == results
 
 
 def test_columns_are_read_by_former_names_too_and_others_are_passed_over(tmp_path):
-    write_csv(tmp_path / "r.csv", [some_result()])
+    write_results(tmp_path / "r.csv", [some_result()])
     header, row = (tmp_path / "r.csv").read_text().splitlines()
     assert header == ",".join(COLUMNS)
     assert row.startswith(f"mst,flocking,reference,4,{5 / 300!r},")
@@ -118,7 +118,7 @@ def test_missing_columns_rows_and_files_are_named(tmp_path):
 
 def test_a_file_that_was_cut_off_is_refused(tmp_path):
     """Within the last cell, which is in quotes: a cut there leaves as many cells as before."""
-    write_csv(tmp_path / "r.csv", [some_result()])
+    write_results(tmp_path / "r.csv", [some_result()])
     text = (tmp_path / "r.csv").read_text()
     (tmp_path / "r.csv").write_text(text[:-3])
     with pytest.raises(ValueError, match=r"no CSV \(unexpected end of data\)"):

@@ -16,7 +16,7 @@ from swarm_mj.evaluation.summary import (
     bootstrap_interval,
     quantile_of_counts,
     spread,
-    summarise,
+    study_results,
     write_evaluated,
 )
 from swarm_mj.mission import paper, reference
@@ -79,7 +79,7 @@ MADE_BY = {"version": "1.2.3", "commit": "abc"}
 
 
 def evaluated(study=None, batches=(*MST, *ROUND_ROBIN)):
-    return summarise(study or two_policies(), dict(enumerate(batches)), MADE_BY)
+    return study_results(study or two_policies(), dict(enumerate(batches)), MADE_BY)
 
 
 def results(*given):
@@ -203,7 +203,7 @@ def test_one_mission_over_a_custom_channel_has_no_errors_no_floor_and_a_differen
 
 def test_missions_come_in_the_order_of_their_seeds_whatever_was_done_first():
     backwards = dict(reversed(list(enumerate([*MST, *ROUND_ROBIN]))))
-    assert summarise(two_policies(), backwards, MADE_BY) == evaluated()
+    assert study_results(two_policies(), backwards, MADE_BY) == evaluated()
     assert evaluated()[0].aoi == [40.0, 46.0, 43.0]
     assert evaluated()[1].velocity_variance == pytest.approx([4.1, 4.8, 4.9])
 

@@ -15,7 +15,7 @@ def some_result(policy, aoi_mean, **overrides):
         spec.name: {str: "paper", int: 1, float: 1.0}[(get_args(spec.type) or (spec.type,))[0]]
         for spec in fields(Result)
     }
-    values["task_cost_name"] = None
+    values |= {"task_cost_name": None, "config": "{}"}
     return Result(**values | {"policy": policy, "aoi_mean": aoi_mean} | overrides)
 
 
@@ -156,6 +156,7 @@ def test_the_lower_bound_stands_below(printed):
     ("other", "said"),
     [
         ({"failure_fraction": 0.2}, "1 windows of paper physics, 20% of the robots off half-way, "),
+        ({"config": '{"collide": true}'}, "1 windows of paper physics, robots collide, 1 mission "),
         ({"bit_rate": 250e3}, ",\nbit rate 250 kbit/s\n"),
         ({"bit_rate": 1e6}, ",\nbit rate 1 Mbit/s\n"),
         ({"arena": "blocks"}, ",\narena blocks\n"),

@@ -12,7 +12,7 @@ from damage import RESULTS, complaint, damaged, program, put_no_file, told_or_re
 from tiny_policies import save_tiny
 
 from swarm_mj.cli import main, script
-from swarm_mj.evaluation.results import COLUMNS, read_results, write_csv
+from swarm_mj.evaluation.results import COLUMNS, read_results, write_results
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.policies.tuning import TABLE, read_table
 
@@ -36,7 +36,7 @@ def test_damaged_files_are_told_or_sound(what, tmp_path, tries):
     """Faults 15, 16: what can be read is within its ranges, and all else is told in a line."""
     path = tmp_path / "file.safetensors"
     write, read = {
-        "results": (lambda: write_csv(path, synthetic.everything()), read_results),
+        "results": (lambda: write_results(path, synthetic.everything()), read_results),
         "table": (lambda: path.write_text("".join(TABLE.open().readlines()[:5])), read_table),
         "policy": (lambda: save_tiny(path), read_policy),
         "curve": (

@@ -22,7 +22,7 @@ from swarm_mj.policies.stored import (
     load_policy,
     read_policy,
     read_weights,
-    save_policy,
+    save_gnn,
     save_weights,
 )
 
@@ -291,7 +291,7 @@ def test_what_could_not_be_loaded_is_not_saved(policy, overrides, complaint):
     network, its = tiny_network(seed=5), dict(overrides)
     network.output.bias.data = its.pop("output", network.output.bias.data)
     with pytest.raises(ValueError, match=complaint):
-        save_policy(policy, network, replace(tiny_config(network), **its), card="# Short")
+        save_gnn(policy, network, replace(tiny_config(network), **its), card="# Short")
     assert torch.equal(read_policy(policy)[0].output.weight, tiny_network().output.weight)
 
 

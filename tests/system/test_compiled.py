@@ -10,7 +10,7 @@ import pytest
 
 import swarm_mj.system.compiled
 import swarm_mj.system.interrupt
-from swarm_mj.system.compiled import _read, digest
+from swarm_mj.system.compiled import _read, sources_digest
 
 PHYSICS = """
 from typing import NamedTuple
@@ -197,7 +197,7 @@ def test_the_digest_of_a_users_file_watches_its_own_package(tmp_path):
     (package / "__init__.py").write_text("")
     (package / "outer.py").write_text("from mine.inner import loop\nfrom numpy import pi\n")
     (package / "inner.py").write_text("loop = 1\n")
-    before = digest(package / "outer.py")
+    before = sources_digest(package / "outer.py")
     (package / "inner.py").write_text("loop = 2\n")
     _read.cache_clear()
-    assert digest(package / "outer.py") != before
+    assert sources_digest(package / "outer.py") != before

@@ -5,7 +5,7 @@ from importlib import import_module
 import pytest
 from synthetic import result, sweep
 
-from swarm_mj.evaluation.results import write_csv
+from swarm_mj.evaluation.results import write_results
 
 
 @pytest.fixture(scope="module")
@@ -18,7 +18,7 @@ def printed(tool, tmp_path, capsys):
     """What the tool prints of some results."""
 
     def printed_of(rows):
-        write_csv(tmp_path / "some.csv", rows)
+        write_results(tmp_path / "some.csv", rows)
         assert tool.main([str(tmp_path / "some.csv")]) == 0
         return capsys.readouterr().out
 

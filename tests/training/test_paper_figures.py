@@ -10,7 +10,7 @@ from synthetic import result
 
 from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import points, published
-from swarm_mj.evaluation.results import read_results, write_csv
+from swarm_mj.evaluation.results import read_results, write_results
 
 NAMES = [
     f"{preset}-{task}.csv"
@@ -30,7 +30,7 @@ def calls(monkeypatch):
         if path.name in calls.broken:
             return 130
         path.parent.mkdir(parents=True, exist_ok=True)
-        write_csv(path, [replace(result("mst"), commit=calls.commit)])
+        write_results(path, [replace(result("mst"), commit=calls.commit)])
         return 0
 
     monkeypatch.setattr(experiment, "commit", lambda: "abc")

@@ -11,7 +11,7 @@ from synthetic import result
 
 from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import RESULT_FIGURES
-from swarm_mj.evaluation.results import read_results, write_csv
+from swarm_mj.evaluation.results import read_results, write_results
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "training" / "reproduce.py"
@@ -77,7 +77,7 @@ def tiny(tmp_path, made, monkeypatch):
         else:
             start, end = arguments.index("--policy") + 1, arguments.index("--task")
             rows = [result(path, baseline=arguments[start]) for path in arguments[start:end]]
-            write_csv(Path(arguments[arguments.index("--csv") + 1]), rows)
+            write_results(Path(arguments[arguments.index("--csv") + 1]), rows)
         return 0
 
     monkeypatch.setattr(program, "swarm_mj", command)

@@ -4,18 +4,19 @@ import math
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from itertools import groupby
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.published import OPTIONS, ResultFigure, points
-from swarm_mj.evaluation.results import Result, carries_more
+from swarm_mj.evaluation.results import Result, carries_more, config_of
 from swarm_mj.mission import PAPERS
-from swarm_mj.system.reading import read_json
+from swarm_mj.mission.components import CALLED_WITH
+from swarm_mj.system.fields import as_typed
 
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
+BEYOND = ("radio", *CALLED_WITH)  # columns that the paper's missions leave empty
 MAX_HOPS = 1000  # a receptive field
 MAX_DECISIONS = 10**12  # a training
 
@@ -105,7 +106,7 @@ def budgets(results: Sequence[Result]) -> list[int]:
     """Return the team decisions of trainings, ascending; raise ValueError for what is no number."""
     numbers = set()
     for result in results:
-        number = _config(result).get("decisions")
+        number = config_of(result).get("decisions")
         if number is not None and not (type(number) is int and 0 < number <= MAX_DECISIONS):
             raise ValueError(
                 f"decisions of {result.policy} must be a number from 1 to {MAX_DECISIONS}, not "
@@ -135,23 +136,13 @@ def _x(figure: ResultFigure, result: Result) -> float | None:
     """Return a result's place on the axis; None for a policy without a receptive field."""
     if figure.sweeps_missions:
         return float(getattr(result, figure.x_name))
-    x = _config(result).get(figure.x_name)
+    x = config_of(result).get(figure.x_name)
     if x is not None and not (isinstance(x, int | float) and 0 <= x <= MAX_HOPS):
         raise ValueError(
             f"{figure.x_name} of {result.policy} must be a number from 0 to {MAX_HOPS}, not "
             f"{x!r:.60}"
         )
     return None if x is None else float(x)
-
-
-def _config(result: Result) -> dict[str, Any]:
-    try:
-        return read_json(result.config, dict)
-    except ValueError as error:
-        raise ValueError(
-            f"config of {result.policy} must be a JSON object, not {result.config!r:.60}; make "
-            "the results with `swarm-mj evaluate --csv FILE`"
-        ) from error
 
 
 def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> None:
@@ -165,13 +156,15 @@ def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> No
                 f"all alike with `{figure.command(first.preset)}`"
             )
     swept = set(OPTIONS) - set(figure.fixed)
-    has = _config(result) | asdict(result)
-    for name, expected in asdict(figure.mission(result.preset)).items():
+    has = config_of(result) | asdict(result)
+    papers = asdict(figure.mission(result.preset)) | dict.fromkeys(BEYOND)
+    for name, expected in papers.items():
         if name not in swept and has.get(name, expected) != expected:
             raise ValueError(
-                f"{figure.name} shows the paper's missions, in which {name} is {expected}, not "
-                f"{has[name]} ({_where(figure, result)}); make them with "
-                f"`{figure.command(result.preset)}`"
+                f"{figure.name} shows the paper's missions, in which {name} is "
+                f"{as_typed(expected)}, not {has[name]} ({_where(figure, result)}); make them with "
+                f"`{figure.command(result.preset)}`, or chart others with `swarm-mj evaluate "
+                "--plot FILE`"
             )
 
 

@@ -97,7 +97,7 @@ def test_a_single_episode_has_no_error_and_no_cost_is_zero():
         ("num_windows", 250, "num_windows is 500, not 250"),
         ("boundary", "none", "boundary is reflect, not none"),
         ("physics", "contact", "physics is exact, not contact"),
-        ("failure_fraction", 0.2, r"failure_fraction is 0\.0, not 0\.2"),
+        ("failure_fraction", 0.2, r"failure_fraction is 0, not 0\.2"),
         ("wall_hit", "mirror", "wall_hit is clip, not mirror"),  # in the config alone
     ],
 )
