@@ -172,7 +172,8 @@ class MissionBatch:
         else:
             for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
                 infos[name] = getattr(costs, name)
-            infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
+            packets = costs.packets
+            infos |= {f"packets_{name}": getattr(packets, name) for name in PACKETS}
             task_cost = costs.task_cost
         return infos if task_cost is None else infos | {"task_cost": task_cost.value}
 

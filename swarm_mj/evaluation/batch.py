@@ -114,7 +114,8 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
             "hops": window.hops,
             "task_cost": task_cost,
         }
-        measured |= {f"packets_{name}": getattr(costs.packets, name) for name in TOTALS}
+        packets = costs.packets
+        measured |= {f"packets_{name}": getattr(packets, name) for name in TOTALS}
         for name, values in measured.items():
             sums[name] = sums.get(name, 0.0) + values
         complete = np.fmin(complete, np.where(costs.is_complete, now, np.nan))

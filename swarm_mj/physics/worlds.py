@@ -54,6 +54,7 @@ class Physics:
         self._qpos = self._batch.bind("qpos").reshape(shape)
         self._qvel = self._batch.bind("qvel").reshape(shape)
         self._ctrl = self._batch.bind("ctrl").reshape(shape)
+        self._wall_m = mission.half_side_m if mission.has_walls else np.inf
         self._rests = scene is None  # no scene can push robots at rest
         # True states, in arrays that later steps do not change.
         self.states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
@@ -90,8 +91,8 @@ class Physics:
         if given.shape != expected:
             shape = f"{expected}, missions by robots by axes"
             raise ValueError(f"acceleration must have shape {shape}, not {given.shape}")
-        if not np.all(is_finite := np.isfinite(given)):
-            b, i, _ = np.argwhere(~is_finite)[0]
+        if not _are_finite(given):
+            b, i, _ = np.argwhere(~np.isfinite(given))[0]
             raise ValueError(
                 f"acceleration must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
                 f"of robot {i} in mission {b}"
@@ -99,18 +100,26 @@ class Physics:
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
-        position_m, velocity_mps = _kick(
+        shape = acceleration_mps2.shape
+        states = self.states = RobotStates(
+            position_m=np.empty(shape),
+            velocity_mps=np.empty(shape),
+            is_active=self.states.is_active,
+        )
+        mission = self._mission
+        _kick(
             self._qpos,
             self._qvel,
             self._ctrl,
             acceleration_mps2,
-            dt_s=self._mission.window_s,
-            limit_mps2=self._mission.max_acceleration_mps2,
-            limit_mps=self._mission.max_velocity_mps,
-            wall_m=self._mission.half_side_m if self._mission.has_walls else np.inf,
-            clips=self._mission.wall_hit == "clip",
+            mission.window_s,
+            mission.max_acceleration_mps2,
+            mission.max_velocity_mps,
+            self._wall_m,
+            mission.wall_hit == "clip",
+            states.position_m,
+            states.velocity_mps,
         )
-        self.states = replace(self.states, position_m=position_m, velocity_mps=velocity_mps)
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         if self._rests and not np.any(self._qvel) and not np.any(acceleration_mps2):
@@ -143,6 +152,14 @@ def _check_free(model: MjModel) -> None:
 
 
 @compiled()
+def _are_finite(numbers: Float[np.ndarray, "B N 2"]) -> bool:
+    for number in numbers.flat:  # noqa: SIM110 - no generators in loops that numba compiles
+        if not np.isfinite(number):
+            return False
+    return True
+
+
+@compiled()
 def _kick(
     qpos: Float[np.ndarray, "B N 2"],
     qvel: Float[np.ndarray, "B N 2"],
@@ -153,10 +170,11 @@ def _kick(
     limit_mps: float,
     wall_m: float,
     clips: bool,  # the robot onto the wall, in place of its mirror image behind it
-) -> tuple[Float[np.ndarray, "B N 2"], Float[np.ndarray, "B N 2"]]:
-    """Accelerate, clip and reflect; qpos has already moved by v dt. Return p and v as copies."""
+    position: Float[np.ndarray, "B N 2"],
+    velocity: Float[np.ndarray, "B N 2"],
+) -> None:
+    """Accelerate, clip and reflect; qpos has already moved by v dt. Copy p and v."""
     num_missions, num_robots = acceleration.shape[:2]
-    position, velocity = np.empty(qpos.shape), np.empty(qpos.shape)
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
@@ -172,4 +190,3 @@ def _kick(
                 ctrl[b, i, axis] = v
                 position[b, i, axis] = p
                 velocity[b, i, axis] = v
-    return position, velocity

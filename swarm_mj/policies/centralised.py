@@ -3,13 +3,14 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.window import LocalViews
+from swarm_mj.system.compiled import compiled
 
 
 class RoundRobin(CentralisedPolicy):
@@ -23,13 +24,26 @@ class RoundRobin(CentralisedPolicy):
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the base, for the one robot whose turn it is."""
-        missions = np.arange(len(views.now))
-        base = np.argmin(np.sum(states.position_m**2, axis=2), axis=1)
-        turn = views.now.astype(np.int64) % (views.num_robots - 1)
-        turn += turn >= base
         recipient = views.silence.copy()
-        recipient[missions, turn] = base
+        _call_base(states.position_m, views.now, recipient)
         return recipient
+
+
+@compiled()
+def _call_base(
+    position_m: Float[np.ndarray, "B N 2"],
+    now: Float[np.ndarray, "B"],
+    recipient: Int[np.ndarray, "B N"],
+) -> None:
+    num_robots = recipient.shape[1]
+    for b in range(recipient.shape[0]):
+        base, nearest_m2 = 0, np.inf
+        for i in range(num_robots):
+            x, y = position_m[b, i]
+            if x * x + y * y < nearest_m2:
+                base, nearest_m2 = i, x * x + y * y
+        turn = int(now[b]) % (num_robots - 1)
+        recipient[b, turn + (turn >= base)] = base
 
 
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):

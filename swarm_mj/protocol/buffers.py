@@ -71,7 +71,7 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
     """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
-    _write_own(
+    write_own(
         buffers.timestamp,
         buffers.position_m,
         buffers.velocity_mps,
@@ -95,7 +95,7 @@ def record_attempt(
     None for `is_active` is everyone. A silent robot addresses itself, which may count as an
     attempt; `BROADCAST` addresses no robot.
     """
-    _write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
+    write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
 
 
 def merge(
@@ -111,7 +111,7 @@ def merge(
     is in the packet, and otherwise names the sender: so buffers remain trees, although some robots
     on the way are left out.
     """
-    _merge_newer(
+    merge_newer(
         buffers.timestamp if sent is None else sent,
         heard,
         buffers.timestamp,
@@ -122,7 +122,7 @@ def merge(
 
 
 @compiled()
-def _write_own(
+def write_own(
     timestamp: Float[np.ndarray, "B N N"],
     believed_m: Float[np.ndarray, "B N N 2"],
     believed_mps: Float[np.ndarray, "B N N 2"],
@@ -131,6 +131,7 @@ def _write_own(
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
+    """Do what `observe_self` says."""
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
@@ -144,13 +145,14 @@ def _write_own(
 
 
 @compiled()
-def _write_attempt(
+def write_attempt(
     last_attempt: Float[np.ndarray, "B N N"],
     recipient: Int[np.ndarray, "B N"],
     now: Float[np.ndarray, "B"],
     silence_is_attempt: bool,
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
+    """Do what `record_attempt` says."""
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
@@ -162,7 +164,7 @@ def _write_attempt(
 
 
 @compiled()
-def _merge_newer(
+def merge_newer(
     sent: Float[np.ndarray, "B N N"],
     heard: Int[np.ndarray, "B N"],
     timestamp: Float[np.ndarray, "B N N"],
@@ -170,6 +172,7 @@ def _merge_newer(
     velocity_mps: Float[np.ndarray, "B N N 2"],
     parent: Int[np.ndarray, "B N N"],
 ) -> None:
+    """Do what `merge` says."""
     num_missions, num_robots = heard.shape
     for b in range(num_missions):
         # Packets are read from the buffers before the phase: a copy where a sender also decodes,

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from swarm_mj.mission.components import is_ours
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.radio.free_space import Channel
+from swarm_mj.system.compiled import compiled
 from swarm_mj.system.fields import name_of
 
 
@@ -19,14 +20,13 @@ def check_robots(
 
     `what` names the choice in the message; `BROADCAST` may be a choice, too.
     """
-    if np.shape(robots) != shape:
-        given = np.shape(robots)
-        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {given}")
+    if robots.shape != shape:
+        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {robots.shape}")
     if robots.dtype.kind not in "iu":
         raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {robots.dtype}")
-    is_robot = (robots >= (BROADCAST if may_broadcast else 0)) & (robots < shape[1])
-    if not np.all(is_robot):
-        b, i = np.argwhere(~is_robot)[0]
+    low = BROADCAST if may_broadcast else 0
+    if not _are_between(robots, low, shape[1]):
+        b, i = np.argwhere((robots < low) | (robots >= shape[1]))[0]
         where = f"{what} of robot {i} in mission {b}"
         raise ValueError(f"{where} must be from 0 to {shape[1] - 1}, not {robots[b, i]}")
 
@@ -56,3 +56,11 @@ def checked_decode(
             "silent; it may answer a robot that transmits, or the listener's own index for nobody"
         )
     return heard
+
+
+@compiled()
+def _are_between(numbers: Int[np.ndarray, "B N"], low: int, end: int) -> bool:
+    for number in numbers.flat:  # noqa: SIM110 - no generators in loops that numba compiles
+        if not low <= number < end:
+            return False
+    return True

@@ -1,6 +1,6 @@
 """The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
 
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -12,8 +12,7 @@ from swarm_mj.protocol.window import Phase
 from swarm_mj.system.compiled import compiled
 
 
-@dataclass(frozen=True, kw_only=True)
-class Packets:
+class Packets(NamedTuple):
     """The fates of one window's packets in every mission [packets].
 
     Addressed packets (Alg. 1) are delivered or lost. A broadcast (IV-C) has no addressee: it is
@@ -33,7 +32,17 @@ class Packets:
     receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
 
 
-PACKET_COUNTS = tuple(spec.name for spec in fields(Packets))
+PACKET_COUNTS = Packets._fields
+
+
+class PhaseCounts(NamedTuple):
+    """The packets of one phase [packets]; names as in `Packets`."""
+
+    sent: Float[np.ndarray, "B"]
+    delivered: Float[np.ndarray, "B"]
+    overheard: Float[np.ndarray, "B"]
+    heard: Float[np.ndarray, "B"]
+    receptions: Float[np.ndarray, "B"]
 
 
 def age_of_information(
@@ -46,8 +55,9 @@ def age_of_information(
     The age at t is in windows. Second is whether all robots know all. Pairs of active robots count,
     at least one robot's in each mission; None is all robots.
     """
-    age, is_complete = _mean_age(buffers.timestamp, now, is_active)
-    return age, is_complete | buffers.is_granted
+    age, is_complete = np.empty(len(now)), buffers.is_granted.copy()
+    _mean_age(buffers.timestamp, now, is_active, age, is_complete)
+    return age, is_complete
 
 
 @compiled()
@@ -67,32 +77,6 @@ def velocity_variance(
                 total += (active_mps[i, axis] - mean) ** 2
         variance[b] = total / num_active
     return variance
-
-
-def count_packets(phases: tuple[Phase, Phase], *, is_broadcast: bool) -> Packets:
-    """Count the fates of one window's packets, per mission.
-
-    Both phases are broadcasts (IV-C), or the second answers the first (Alg. 1).
-    """
-    first, second = _count(phases[0]), _count(phases[1])
-    transmitted = first.sent + second.sent
-    if is_broadcast:
-        counts = {
-            "sent": transmitted,
-            "heard": first.heard + second.heard,
-            "receptions": first.receptions + second.receptions,
-        }
-    else:
-        counts = {
-            "sent": first.sent,
-            "attempted": first.sent,
-            "delivered": first.delivered,
-            "lost": first.sent - first.delivered,
-            "overheard": first.overheard + second.overheard,
-            "answered": second.delivered,
-        }
-    none = dict.fromkeys(PACKET_COUNTS, np.full_like(transmitted, np.nan))
-    return Packets(**none | counts | {"transmitted": transmitted})
 
 
 def mean_hops(
@@ -119,15 +103,38 @@ class TaskCost:
     value: Float[np.ndarray, "B"]
 
 
-@dataclass(frozen=True, kw_only=True)
-class WindowCosts:
+class WindowCosts(NamedTuple):
     """The costs of one window, in every mission."""
 
     age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
     is_complete: Bool[np.ndarray, "B"]  # whether all robots know all others
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
-    packets: Packets
+    counts: Float[np.ndarray, "2 C B"]  # of packets in each phase, in the order of `PhaseCounts`
+    is_broadcast: bool  # whether both phases are broadcasts (IV-C), or the second answers (Alg. 1)
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
+
+    @property
+    def packets(self) -> Packets:
+        """The fates of the packets."""
+        first, second = PhaseCounts(*self.counts[0]), PhaseCounts(*self.counts[1])
+        transmitted = first.sent + second.sent
+        if self.is_broadcast:
+            counts = {
+                "sent": transmitted,
+                "heard": first.heard + second.heard,
+                "receptions": first.receptions + second.receptions,
+            }
+        else:
+            counts = {
+                "sent": first.sent,
+                "attempted": first.sent,
+                "delivered": first.delivered,
+                "lost": first.sent - first.delivered,
+                "overheard": first.overheard + second.overheard,
+                "answered": second.delivered,
+            }
+        none = dict.fromkeys(PACKET_COUNTS, np.full_like(transmitted, np.nan))
+        return Packets(**none | counts | {"transmitted": transmitted})
 
 
 def window_costs(
@@ -140,14 +147,24 @@ def window_costs(
     task_cost: TaskCost | None = None,
 ) -> WindowCosts:
     """Return all costs of one window for the active robots; arguments as above."""
-    age, is_complete = age_of_information(buffers, now, states.is_active)
-    return WindowCosts(
-        age_windows=age,
-        is_complete=is_complete,
-        velocity_variance_m2ps2=velocity_variance(states.velocity_mps, states.is_active),
-        packets=count_packets(phases, is_broadcast=is_broadcast),
-        task_cost=task_cost,
+    first, second = phases
+    age, is_complete = np.empty(len(now)), buffers.is_granted.copy()
+    variance, counts = np.empty(len(now)), np.empty((2, len(PhaseCounts._fields), len(now)))
+    _measure(
+        buffers.timestamp,
+        now,
+        states.velocity_mps,
+        states.is_active,
+        first.recipient,
+        first.heard,
+        second.recipient,
+        second.heard,
+        age,
+        is_complete,
+        variance,
+        counts,
     )
+    return WindowCosts(age, is_complete, variance, counts, is_broadcast, task_cost)
 
 
 # In these, None for `is_active` is compiled apart: without the tests, and as fast as without them.
@@ -157,8 +174,9 @@ def _mean_age(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
-) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
-    age, is_complete = np.empty(len(now)), np.empty(len(now), dtype=np.bool_)
+    age: Float[np.ndarray, "B"],
+    is_complete: Bool[np.ndarray, "B"],
+) -> None:
     for b in range(len(now)):
         active = timestamp[b] if is_active is None else timestamp[b][is_active[b]][:, is_active[b]]
         total, num_unknown, num_active = 0.0, 0, active.shape[0]
@@ -167,40 +185,53 @@ def _mean_age(
                 total += active[i, j]
                 num_unknown += active[i, j] <= NEVER
         age[b] = now[b] - total / (num_active * num_active)
-        is_complete[b] = num_unknown == 0
-    return age, is_complete
-
-
-class _PhaseCounts(NamedTuple):
-    """The packets of one phase [packets]; names as in `Packets`."""
-
-    sent: Float[np.ndarray, "B"]
-    delivered: Float[np.ndarray, "B"]
-    overheard: Float[np.ndarray, "B"]
-    heard: Float[np.ndarray, "B"]
-    receptions: Float[np.ndarray, "B"]
+        is_complete[b] |= num_unknown == 0
 
 
 @compiled()
-def _count(phase: Phase) -> _PhaseCounts:
-    recipient, heard = phase
-    num_missions, num_robots = recipient.shape
-    none = np.zeros(num_missions)
-    counts = _PhaseCounts(none, none.copy(), none.copy(), none.copy(), none.copy())
-    is_heard = np.empty(num_robots, dtype=np.bool_)
-    for b in range(num_missions):
+def _measure(
+    timestamp: Float[np.ndarray, "B N N"],
+    now: Float[np.ndarray, "B"],
+    velocity_mps: Float[np.ndarray, "B N 2"],
+    is_active: Bool[np.ndarray, "B N"] | None,
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    recipient_2: Int[np.ndarray, "B N"],
+    heard_2: Int[np.ndarray, "B N"],
+    age: Float[np.ndarray, "B"],
+    is_complete: Bool[np.ndarray, "B"],
+    variance: Float[np.ndarray, "B"],
+    counts: Float[np.ndarray, "2 C B"],
+) -> None:
+    """Fill in all costs, in one call: of a single mission, calls cost more than what they do."""
+    _mean_age(timestamp, now, is_active, age, is_complete)
+    variance[:] = velocity_variance(velocity_mps, is_active)
+    _count(recipient, heard, counts[0])
+    _count(recipient_2, heard_2, counts[1])
+
+
+@compiled()
+def _count(
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    counts: Float[np.ndarray, "C B"],
+) -> None:
+    sent, delivered, overheard = counts[0], counts[1], counts[2]
+    num_heard, receptions = counts[3], counts[4]
+    is_heard = np.empty(recipient.shape[1], dtype=np.bool_)
+    counts[:] = 0.0
+    for b in range(recipient.shape[0]):
         is_heard[:] = False
-        for i in range(num_robots):
-            counts.sent[b] += recipient[b, i] != i
+        for i in range(recipient.shape[1]):
+            sent[b] += recipient[b, i] != i
             sender = heard[b, i]
             if sender != i:
                 is_meant = recipient[b, sender] == i
-                counts.delivered[b] += is_meant
-                counts.overheard[b] += not is_meant
-                counts.heard[b] += not is_heard[sender]
-                counts.receptions[b] += 1
+                delivered[b] += is_meant
+                overheard[b] += not is_meant
+                num_heard[b] += not is_heard[sender]
+                receptions[b] += 1
                 is_heard[sender] = True
-    return counts
 
 
 @compiled()

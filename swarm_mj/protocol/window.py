@@ -16,10 +16,10 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.packets import entries_sent
+from swarm_mj.protocol.compiled_window import answer, talk
+from swarm_mj.protocol.packets import PartialBuffers, entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
-from swarm_mj.system.compiled import compiled
 
 
 class Phase(NamedTuple):
@@ -156,13 +156,8 @@ def window(
     the start of the window [windows]. Silence may count as addressing oneself (Eq. 7).
     """
     t = now + SLOT_WINDOWS
-    transmission = transmit(
-        buffers, states, recipient, channel, t, silence_is_attempt=silence_is_attempt
-    )
-
-    t = now + 2.0 * SLOT_WINDOWS
-    response = exchange(buffers, states, respondents(transmission), channel, t)
-    return transmission, response
+    first, second = _slots(buffers, states, recipient, channel, t, 2, silence_is_attempt)
+    return first, second
 
 
 def transmit(
@@ -178,8 +173,45 @@ def transmit(
 
     Robots that transmit address a teammate or, with BROADCAST, everyone.
     """
+    (phase,) = _slots(buffers, states, recipient, channel, now, 1, silence_is_attempt)
+    return phase
+
+
+def _slots(
+    buffers: Buffers,
+    states: RobotStates,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    num_slots: int,
+    silence_is_attempt: bool,
+) -> tuple[Phase, ...]:
+    """Play a slot, and the responses in a second: compiled where all of it is the package's own."""
+    if type(channel) is FreeSpaceRadio and not isinstance(buffers, PartialBuffers):
+        said = talk(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
+        return tuple([Phase(said[s, 0], said[s, 1]) for s in range(num_slots)])
+    return alg_1(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
+
+
+def alg_1(
+    buffers: Buffers,
+    states: RobotStates,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    num_slots: int,
+    silence_is_attempt: bool,
+) -> tuple[Phase, ...]:
+    """Play a slot of transmissions, and a second of responses if there are two, over any channel.
+
+    Arguments are as in `transmit`. `compiled_window.talk` does the same in one compiled call.
+    """
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    return exchange(buffers, states, recipient, channel, now)
+    transmission = exchange(buffers, states, recipient, channel, now)
+    if num_slots == 1:
+        return (transmission,)
+    answered = respondents(transmission)
+    return transmission, exchange(buffers, states, answered, channel, now + SLOT_WINDOWS)
 
 
 def exchange(
@@ -201,15 +233,10 @@ def exchange(
     return Phase(recipient=sent_to.copy(), heard=heard)
 
 
-@compiled()
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
     """Return whom each robot answers: the sender it decoded, if that packet was meant for it."""
-    recipient, heard = transmission
-    answered = np.empty_like(recipient)
-    for b in range(recipient.shape[0]):
-        for j in range(recipient.shape[1]):
-            i = heard[b, j]
-            answered[b, j] = i if recipient[b, i] == j else j
+    answered = np.empty_like(transmission.recipient)
+    answer(transmission.recipient, transmission.heard, answered)
     return answered
 
 

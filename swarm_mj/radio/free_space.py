@@ -7,6 +7,7 @@ itself heard nobody: no sentinel is needed.
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, runtime_checkable
 
 import numpy as np
@@ -75,7 +76,7 @@ class FreeSpaceRadio:
     frequency_hz: float  # nu [Hz]
     recipient_hears_while_sending: bool = False
 
-    @property
+    @cached_property
     def received_at_1_m_mw(self) -> float:
         """Power received over one metre [mW]; free space scales it by 1/d² (Eqs. 1-2)."""
         return self.power_mw * channel_gain(path_loss_db(1.0, self.frequency_hz))
@@ -84,7 +85,7 @@ class FreeSpaceRadio:
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes (Eqs. 1-4); arguments as in `Channel`."""
-        return _decode_strongest(
+        return decode_strongest(
             position_m,
             recipient,
             self.received_at_1_m_mw,
@@ -95,7 +96,7 @@ class FreeSpaceRadio:
 
 
 @compiled()
-def _decode_strongest(
+def decode_strongest(
     position_m: Float[np.ndarray, "B N 2"],
     recipient: Int[np.ndarray, "B N"],
     received_at_1_m_mw: float,

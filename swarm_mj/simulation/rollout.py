@@ -80,10 +80,8 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
     variance = [window.costs.velocity_variance_m2ps2 for window in flown]
     is_complete = np.stack([window.costs.is_complete for window in flown])
     first_complete = np.argmax(is_complete, axis=0) + 1.0
-    packets = {
-        name: np.sum([getattr(window.costs.packets, name) for window in flown], axis=0)
-        for name in PACKET_COUNTS
-    }
+    counted = np.sum([window.costs.packets for window in flown], axis=0)
+    packets = dict(zip(PACKET_COUNTS, counted, strict=True))
     receptions = packets.pop("receptions")
     num_sent = np.where(packets["sent"] > 0, packets["sent"], np.nan)
     return Summary(

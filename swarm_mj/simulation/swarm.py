@@ -72,6 +72,7 @@ class Swarm:
         self.channel, self.belief, self.truth = radio
         is_tasks = own.controller is None
         self.controller: Controller = controller_of(mission) if is_tasks else own.controller
+        self._controller_is_ours = is_ours(self.controller)
         self._costed = costed(self.controller)
         self._num_missions = len(seeds)
         self.restart(seeds)
@@ -167,19 +168,20 @@ class Swarm:
             raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
         policy.start(self.mission.num_robots, self._rngs.policy)
         self.buffers = with_room(self.buffers, room)
-        self._policy = policy
+        self._policy, self._window = policy, policy.window(self.mission)
+        self._policy_is_ours = is_ours(policy)
 
     def decide(self) -> Int[np.ndarray, "B N"]:
         """Return whom each robot addresses next, by the policy that was started."""
-        policy = self.policy
-        views = self.views if is_ours(policy) else self.views.copy()
+        policy, is_trusted = self.policy, self._policy_is_ours
+        views = self.views if is_trusted else self.views.copy()
         if isinstance(policy, CentralisedPolicy):
-            return policy.recipients(views, self._states_for(policy))
+            return policy.recipients(views, self._states_for(is_trusted))
         return policy.recipients(views)
 
     def move(self) -> RobotStates:
         """Move the robots through one window, by their controller and the physics."""
-        wanted_mps2 = self.controller(self._read_only, self._states_for(self.controller))
+        wanted_mps2 = self.controller(self._read_only, self._states_for(self._controller_is_ours))
         return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
 
     def step(self, policy: Policy | None = None) -> WindowCosts:
@@ -190,7 +192,8 @@ class Swarm:
         """
         if policy is not None and policy is not self._policy:
             self.start(policy)
-        return self._play(self.policy.window(self.mission), self.decide)
+        _ = self.policy  # raises if none was started
+        return self._play(self._window, self.decide)
 
     def step_with_recipients(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
         """Fly one window of Alg. 1 with these recipients; itself is silence.
@@ -200,9 +203,9 @@ class Swarm:
         request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
         return self._play(request_response, lambda: recipient)
 
-    def _states_for(self, component: object) -> RobotStates:
+    def _states_for(self, is_trusted: bool) -> RobotStates:
         """Return the true states; a user's own component gets copies, so it can move nothing."""
-        return self.states if is_ours(component) else deepcopy(self.states)
+        return self.states if is_trusted else deepcopy(self.states)
 
     def _play(
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
@@ -210,9 +213,8 @@ class Swarm:
         """Fly one window of this protocol."""
         start, self.is_broadcast = self.now, window.is_broadcast
         decide_after = partial(self._decide_after, decide, start)
-        survivors, is_due = self._survivors, start[0] >= self.mission.failure_window
-        if survivors is not None and is_due and self.states.is_active is None:
-            self._physics.deactivate(survivors)
+        if self._survivors is not None and start[0] == self.mission.failure_window:
+            self._physics.deactivate(self._survivors)
         self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
         self.now = start + 1.0
         return window_costs(
@@ -243,7 +245,8 @@ class Swarm:
         controller = self._costed
         if controller is None:
             return None
-        value = np.asarray(controller.cost(self._states_for(controller)), dtype=np.float64)
+        states = self._states_for(self._controller_is_ours)
+        value = np.asarray(controller.cost(states), dtype=np.float64)
         if value.shape != self.now.shape or not np.all(value >= 0.0):
             raise ValueError(
                 f"a controller's cost must have shape {self.now.shape}, one number of 0 or more "

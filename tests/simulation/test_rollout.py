@@ -5,31 +5,40 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.costs import Packets, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import PhaseCounts, WindowCosts, mean_hops
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
 ADDRESSED = ("attempted", "delivered", "lost", "overheard", "answered")
-BROADCAST = ("sent", "heard", "receptions")
-TRANSMITTED = {"transmitted": [4.0, 2.0]}  # in each window
-
-
-def packets_of(**counts):
-    """Counts of one kind of packets in two missions; those of the other kind are nan."""
-    nothing = {name: [np.nan, np.nan] for name in (*ADDRESSED, *BROADCAST)} | TRANSMITTED
-    return Packets(**{name: np.array(count) for name, count in (nothing | counts).items()})
+TRANSMITTED = np.array([4.0, 2.0])  # in each window
 
 
 def flown_by_hand(age, variance, is_complete, hops, packets):
     """One window of two missions; packets: attempted, delivered, lost, overheard, answered."""
-    counts = {name: np.array(count, float) for name, count in zip(ADDRESSED, packets, strict=True)}
+    attempted, delivered, _, overheard, answered = (np.array(count, float) for count in packets)
+    nothing = np.zeros(2)
     costs = WindowCosts(
         age_windows=np.array(age),
         is_complete=np.array(is_complete),
         velocity_variance_m2ps2=np.array(variance),
-        packets=packets_of(sent=counts["attempted"], **counts),
+        counts=np.array(
+            [
+                PhaseCounts(attempted, delivered, overheard, nothing, nothing),
+                PhaseCounts(TRANSMITTED - attempted, answered, nothing, nothing, nothing),
+            ]
+        ),
+        is_broadcast=False,
     )
     return WindowRecord(costs=costs, hops=np.array(hops))
+
+
+def broadcast_by_hand(window, packets):
+    """The same window with broadcasts in its first phase: sent, heard, receptions."""
+    sent, heard, receptions = (np.array(count) for count in packets)
+    nothing = np.zeros(2)
+    first = PhaseCounts(sent, nothing, nothing, heard, receptions)
+    counts = np.array([first, np.zeros_like(first)])
+    return replace(window, costs=window.costs._replace(counts=counts, is_broadcast=True))
 
 
 THREE_WINDOWS = [
@@ -72,15 +81,7 @@ def test_summary_by_hand():
 def test_broadcasts_are_summed_up_by_hand():
     """7 of 10 packets are heard, by 15 robots; in the second mission none is sent."""
     counts = [([6.0, 0.0], [4.0, 0.0], [12.0, 0.0]), ([4.0, 0.0], [3.0, 0.0], [3.0, 0.0])]
-    flown = [
-        replace(
-            window,
-            costs=replace(
-                window.costs, packets=packets_of(**dict(zip(BROADCAST, count, strict=True)))
-            ),
-        )
-        for window, count in zip(THREE_WINDOWS[:2], counts, strict=True)
-    ]
+    flown = [broadcast_by_hand(*each) for each in zip(THREE_WINDOWS[:2], counts, strict=True)]
     summary = summarise(flown)
     np.testing.assert_array_equal(summary.packets_sent, [10.0, 0.0])
     np.testing.assert_array_equal(summary.packets_heard, [7.0, 0.0])

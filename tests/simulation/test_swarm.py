@@ -43,7 +43,7 @@ def course(swarm, policy, num_windows=NUM_WINDOWS):
         seen += [array.copy() for array in vars(swarm.buffers).values()]
         seen += [array for phase in swarm.phases for array in phase]
         seen += [costs.age_windows, costs.is_complete, costs.velocity_variance_m2ps2]
-        seen += list(vars(costs.packets).values())
+        seen += list(costs.packets)
     return seen
 
 
