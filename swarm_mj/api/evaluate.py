@@ -116,7 +116,7 @@ def evaluate(
     *,
     num_missions: int = 100,
     seed: int = 1000,
-    baseline: str | None = None,
+    baseline: str | Path | None = None,
     probability: float | None = None,
     is_deterministic: bool = False,
     channel: str | None = None,
@@ -169,7 +169,7 @@ def evaluate(
         seed=seed,
         probability=probability,
         is_deterministic=is_deterministic,
-        baseline=baseline,
+        baseline=None if baseline is None else normalised(str(baseline)),
         features=(features,) if isinstance(features, str) else tuple(features),
         components=Components(**components),
     )

@@ -121,6 +121,7 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
     yield "Other policies:", f"{name} policies"
     policies = " ".join(map(shlex.quote, dict.fromkeys((options.policy, *COMPARED))))
     parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.names.items()]
+    parts += [f"--features {shlex.join(options.features)}"] if options.features else []
     flags = " ".join((mission_flags(options.mission), *parts))
     yield "Compare some:", f"{name} evaluate --policy {policies} --episodes 5 {flags}"
 

@@ -1,5 +1,6 @@
 """Options that several commands share: those that make missions, and those of policies."""
 
+import shlex
 from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from functools import partial
@@ -100,7 +101,7 @@ def mission_flags(mission: Mission) -> str:
     usual = replace(PRESETS[mission.preset](mission.task), preset=Mission().preset)
     named = {spec: getattr(mission, spec.name) for spec in SPECS}
     return " ".join(
-        flags_of(spec)[0] if value is True else f"{flags_of(spec)[0]} {as_typed(value)}"
+        flags_of(spec)[0] + ("" if value is True else f" {shlex.quote(as_typed(value))}")
         for spec, value in named.items()
         if spec.name == "task" or value != getattr(usual, spec.name)
     )

@@ -19,10 +19,10 @@ NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the tabl
 NONE = "-"
 
 
-def results_text(results: Sequence[Result], *, is_wide: bool = False) -> str:
+def results_text(results: Sequence[Result]) -> str:
     """Return the tables of `print_results` as plain text, for any terminal."""
     file = io.StringIO()
-    print_results(results, file, is_wide=is_wide)
+    print_results(results, file)
     return file.getvalue().rstrip()
 
 

@@ -4,6 +4,7 @@ import json
 
 import numpy as np
 import pytest
+from tiny_policies import save_tiny
 
 import swarm_mj
 from swarm_mj.api import evaluate as module
@@ -60,6 +61,14 @@ def test_it_agrees_with_flights_one_by_one(found):
     ]
     mean = np.mean([run.summary.aoi_mean for run in ages])
     assert found.summary.tdma.aoi_mean == pytest.approx(mean)
+
+
+def test_a_baseline_may_be_a_path_as_policies_may(here):
+    save_tiny(here / "own")
+    for typed in ("././own.safetensors", here / "own.safetensors"):
+        found = swarm_mj.evaluate(["tdma", typed], num_missions=2, baseline=typed, **SHORT)
+        tdma, own = (each.result for each in found.results)
+        assert tdma.baseline == own.policy == own.baseline
 
 
 def test_it_shows_itself_as_the_table(found, monkeypatch):

@@ -171,7 +171,8 @@ def test_viewing_needs_a_display_and_says_so_first(here, monkeypatch, capsys):
 
 def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
     mission, path = paper("random-walk", num_robots=9), Path("a b.rrd")
-    options = fly.FlyOptions(mission=mission, policy="runs/my own", channel="my:Radio")
+    own = {"policy": "runs/my own", "channel": "my:Radio", "features": ("my:A", "my:B")}
+    options = fly.FlyOptions(mission=mission, **own)
     monkeypatch.setattr("swarm_mj.replay.view.sys.platform", "linux")
     for display, way in ((":1", ""), ("", "--web ")):
         monkeypatch.setenv("DISPLAY", display)
@@ -180,7 +181,7 @@ def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
         assert told["Open the replay:"].endswith(f"swarm-mj replay {way}'a b.rrd'")
     assert told["Compare some:"].endswith(
         "evaluate --policy 'runs/my own' planner tdma random-flooding --episodes 5 "
-        "--task random-walk --robots 9 --channel my:Radio"
+        "--task random-walk --robots 9 --channel my:Radio --features my:A my:B"
     )
     assert "Open the replay:" not in dict(fly._next_commands(options, None))
     for line in told.values():

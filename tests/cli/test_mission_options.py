@@ -1,5 +1,7 @@
 """The options' missions and policies are the library's, and so are their defaults."""
 
+import shlex
+
 import pytest
 
 import swarm_mj
@@ -114,10 +116,12 @@ def test_former_options_still_count(former, present):
         PRESETS["urban"]("stationary", arena="open", num_robots=9),
         PRESETS["open-field"]("flocking", path_loss="free-space", fading="none"),
         paper("stationary", fading="rayleigh", prior_knowledge="statistics,start"),
+        paper("stationary", arena="my 'red' hall.xml"),
     ],
 )
 def test_the_flags_of_a_mission_make_it_again(wanted):
-    assert mission(*mission_flags(wanted).split()) == wanted
+    """As a shell reads them."""
+    assert mission(*shlex.split(mission_flags(wanted))) == wanted
 
 
 def test_flags_leave_out_what_is_as_usual():
