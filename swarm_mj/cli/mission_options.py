@@ -36,7 +36,7 @@ class PolicyOptions(Components):
     )
     payload: str = _policy(
         "snapshots",
-        "what the planner's packets carry beyond the buffers T, M and P",
+        "what the planner's packets carry beyond T, M and P; in stationary teams, links",
         choices=PAYLOADS,
     )
     features: tuple[str, ...] = setting(

@@ -28,7 +28,7 @@ from swarm_mj.system.fields import check_kind, did_you_mean
 from swarm_mj.system.packages import asset, need
 
 WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
-PAYLOADS = ("snapshots", "none")
+PAYLOADS = ("snapshots", "none")  # the planner's own, which at rest is links, or nothing
 
 
 def _planner(mission: Mission) -> Planner | RestingPlanner:

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
 from swarm_mj.policies.gnn.edge_sums import EdgeSums, as_array, edges_to
-from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.network import AggregationGnn, edges_of, mean_aggregation
 from swarm_mj.policies.policy_config import GnnShape
 
 NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
@@ -100,7 +100,8 @@ class Composed:
     def __init__(self, network: AggregationGnn) -> None:
         """Compose the weights as they are now; gradients flow back to them."""
         assert network.core is not None
-        self._is_upward, num_blocks = IS_UPWARD[network.shape.edges], network.shape.receptive_field
+        self._shape, num_blocks = network.shape, network.shape.receptive_field
+        self._is_upward = IS_UPWARD[network.shape.edges]
         self._is_compiled = network.shape.depth == 2 and num_blocks == 1
         self._encoder, self._decoder = network.encoder.node.layers, network.decoder.node.layers
         self._edge, self._node = network.core.edge.layers, network.core.node.layers
@@ -135,12 +136,16 @@ class Composed:
         if self._is_compiled and node.device.type == "cpu":
             output = output + self._decode(1, self._only_block(v, own, parent, is_wanted))
         else:
-            links, e = ParentLinks(parent, self._is_upward, node.dtype), list(self._encoded_edges)
+            edges = edges_of(parent, self._shape.edges, node.dtype)
+            has_edge = node.new_zeros(parent.numel()).index_fill(0, edges.receiver, 1.0)
+            e = self._encoded_edges.index_select(0, edges.feature.flatten().long())
             for stage, entries in enumerate(self._stages[:-1], start=1):
-                e = e if stage == 1 else [self._edge_again(each) for each in e]
-                ends = links.from_ends(entries.receiver(v), entries.sender(v))
-                e = [hidden(x.add_(y), self._edge[1:-1]) for x, y in zip(ends, e, strict=True)]
-                v = self._update_nodes(entries.node(v), links.mean(e), links.has_edge)
+                e = e if stage == 1 else self._edge_again(e)
+                ends = entries.receiver(v).index_select(0, edges.receiver).add_(e)
+                ends = ends.add_(entries.sender(v).index_select(0, edges.sender))
+                e = hidden(ends, self._edge[1:-1])
+                mean = mean_aggregation(e, edges.receiver, len(v))
+                v = self._update_nodes(entries.node(v), mean, has_edge)
                 output = output + self._decode(stage, v.index_select(0, wanted))
         everyone = output.new_zeros(parent.numel(), output.shape[1])
         return everyone.index_copy(0, wanted, output).view(*parent.shape, output.shape[1])
@@ -170,38 +175,3 @@ class Composed:
         entered = entered.addmm_(mean, self._mean.weight.T)
         entered = entered.addr_(has_edge, self._mean.bias)  # without edges the mean is 0
         return hidden(entered, self._node[1:-1])
-
-
-class ParentLinks:
-    """One edge per node and direction, between it and its parent.
-
-    A node without a parent has an edge with itself that counts for nothing: so the edges of one
-    direction are as many as the nodes, and only the parents' rows have to be looked up.
-    """
-
-    def __init__(self, parent: Parents, is_upward: tuple[bool, ...], dtype: torch.dtype) -> None:
-        """Find the ends; means have this type."""
-        own = torch.arange(parent.numel(), device=parent.device).view(parent.shape)
-        has_parent = parent >= 0
-        self._is_upward = is_upward
-        self._parent = torch.where(has_parent, own[:, :1] + parent, own).flatten()
-        count = has_parent.flatten().to(dtype)
-        degree = torch.zeros_like(count)
-        for is_up in is_upward:
-            degree = degree.index_add(0, self._parent, count) if is_up else degree + count
-        self.has_edge = degree.clamp(max=1)
-        share = degree.clamp(min=1).reciprocal()
-        self._share = [count * (share[self._parent] if up else share) for up in is_upward]
-
-    def from_ends(self, receiver: Rows, sender: Rows) -> list[Rows]:
-        """For every edge, its receiver's row of one array plus its sender's of another."""
-        ends = [(receiver, sender) if is_up else (sender, receiver) for is_up in self._is_upward]
-        return [above.index_select(0, self._parent).add_(below) for above, below in ends]
-
-    def mean(self, edge: list[Rows]) -> Rows:
-        """For each node, the mean over the edges that it receives; 0 without any."""
-        total = torch.zeros_like(edge[0])
-        for is_up, share, rows in zip(self._is_upward, self._share, edge, strict=True):
-            part = rows * share[:, None]
-            total = total.index_add_(0, self._parent, part) if is_up else total.add_(part)
-        return total
