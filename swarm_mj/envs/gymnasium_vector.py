@@ -51,12 +51,12 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         modes = {"autoreset_mode": autoreset_mode, "render_mode": render_mode}
         EzPickle.__init__(self, num_envs, mission, **modes, **options)
         check_count("num_envs", num_envs)
-        self.num_envs, self._mode = num_envs, _mode_of(autoreset_mode)
-        self.autoreset_mode = self._mode  # where TorchRL looks for it
+        self.num_envs = num_envs
+        self.autoreset_mode = _mode_of(autoreset_mode)  # TorchRL looks for it here
         self._screen, self.render_mode = Screen(render_mode, MODES), render_mode
         self._mission, self._options = mission, options
         batch = make_team_batch(mission, num_envs, **options)
-        self.metadata = rendering(batch.mission, MODES) | {"autoreset_mode": self._mode}
+        self.metadata = rendering(batch.mission, MODES) | {"autoreset_mode": self.autoreset_mode}
         # Of each environment: the batch that flies it, and its row there.
         self._batches = np.full(num_envs, batch, dtype=object)
         self._rows = np.arange(num_envs)
@@ -118,7 +118,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         infos: Info = {}
         final_infos: Info = {}  # of missions that end in this step, and begin anew in it
         was_over = self._is_over.copy()  # in the mode NEXT_STEP; they begin in this step
-        is_same_step = self._mode == AutoresetMode.SAME_STEP
+        is_same_step = self.autoreset_mode == AutoresetMode.SAME_STEP
         for batch in dict.fromkeys(self._batches[~was_over]):
             envs = np.flatnonzero(self._batches == batch)
             rows = self._rows[envs]
@@ -152,7 +152,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._screen.close()
 
     def _check_step(self, actions: np.ndarray) -> None:
-        if self._is_over.any() and self._mode == AutoresetMode.DISABLED:
+        if self._is_over.any() and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ValueError(
                 f"environment {np.argmax(self._is_over)} is over; begin it anew by reset(options="
                 '{"reset_mask": mask})'

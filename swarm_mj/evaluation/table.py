@@ -96,12 +96,13 @@ def _table(results: Sequence[Result], cells_of: Callable[[Result], dict[str, str
 def _brief_cells(result: Result) -> dict[str, str]:
     """Return the cells that most people read, in one line."""
     heard = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
+    mean, interval = _difference(result, "aoi").split("\n")
     own_cost = {}
     if _has_own_cost(result):
         own_cost["task cost ± SEM"] = _plus_minus(result.task_cost_mean, result.task_cost_sem)
     return {
         "AoI ± SEM": _plus_minus(result.aoi_mean, result.aoi_sem),
-        f"minus {result.baseline}'s [95 %]": " ".join(_difference(result, "aoi").split("\n")),
+        f"minus {result.baseline}'s [95 %]": f"{mean} [{interval}]" if interval else mean,
         **own_cost,
         "heard": _number(heard, ".0%"),
     }
@@ -186,15 +187,14 @@ def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
 
 def _legend(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
     """Yield the meanings of the columns, a sentence each."""
-    first = results[0]
     yield (
-        "AoI: age of information, how old a robot's news of another is [windows]; mean over "
-        f"{first.episodes} missions from seed {first.seed},"
+        "AoI: age of information, how old a robot's news of another is [windows]; mean over the "
+        "missions,"
     )
     if is_wide:
         yield (
             "standard error and 95 % interval. Median and p95 are over missions. "
-            f"Difference: AoI minus that of {first.baseline}, mission by mission. "
+            f"Difference: AoI minus that of {results[0].baseline}, mission by mission. "
             "Packets: sent in a window, and the share that reached its addressee or, of "
             "broadcasts, at least one robot; hearers: robots that decoded a broadcast, on average. "
             "Bytes: of a packet."

@@ -66,7 +66,7 @@ def test_the_table_has_what_most_people_read_unless_it_is_wide(printed):
     heading, _, *table = lines[[line[:6] for line in lines].index("policy") :]
     assert heading.split() == ["policy", "AoI", "±", "SEM", "minus", "b's", "[95", "%]", "heard"]
     assert table[0].split() == ["b", "2.00", "±", "0.50", "-", "25%"]
-    assert table[1].split() == ["a", "3.50", "±", "0.50", "1.50", "1.00,", "2.00", "25%"]
+    assert table[1].split() == ["a", "3.50", "±", "0.50", "1.50", "[1.00,", "2.00]", "25%"]
     assert max(map(len, lines)) <= 80
     for rare in ("median", "Bytes", "Published", "kbit/s"):
         assert rare not in "\n".join(lines)
