@@ -2,10 +2,9 @@
 
 import itertools
 from collections.abc import Iterable, Sequence
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
-import pyarrow as pa
 import rerun as rr
 from jaxtyping import Bool, Float, Int, Shaped
 
@@ -17,7 +16,14 @@ from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
 
-TREE_WIDTH, TREE_HEIGHT = 600.0, 400.0  # of the tree's view, in its own units
+TREE = (
+    600.0,
+    400.0,
+)  # width and height of the tree's view, and of the matrix, in units of their own
+STATES = (1400.0, 1000.0)  # of the states, likewise
+OLDEST = 255  # shade of an age in the matrix, from 0
+NUM_NAMES, NUM_TICKS = 20, 6  # about so many robots and windows are named beside the states
+BESIDE = 0.02  # of the states' width and height: from them to the names
 RATE_WINDOWS = 10  # that packets are counted over
 
 
@@ -29,9 +35,10 @@ def draw_tree(out: RerunLog) -> None:
     colours = palette.robot_colours(log.known_age, log.facts.full_scale, shown, log.ego)
     place = dendrogram(log.parent, ~np.isnan(log.known_age), log.ego)
     max_hops = max(4.0, float(np.nanmax(place[..., 0])))
-    place *= (TREE_WIDTH / max_hops, TREE_HEIGHT)
-    across = np.arange(1, int(max_hops) + 1) * (TREE_WIDTH / int(max_hops))
-    strips = [[(x, -10.0), (x, TREE_HEIGHT + 10.0)] for x in across]
+    width, height = TREE
+    place *= (width / max_hops, height)
+    across = np.arange(1, int(max_hops) + 1) * (width / int(max_hops))
+    strips = [[(x, -10.0), (x, height + 10.0)] for x in across]
     out.fixed_layer("tree/hops", strips=strips)
     row, child = np.nonzero(log.has_parent)
     out.lines("tree/edges", place[row, log.parent[row, child]], place[row, child], row)
@@ -83,37 +90,55 @@ def draw_age_matrix(out: RerunLog) -> None:
     log, full_scale = out.log, out.log.facts.full_scale
     parent = spanning_tree(log.position_m[:1])[0].tolist()
     order = walk(parent, range(len(parent)), ROOT)[0][1:]
-    ages = np.minimum(log.age[:, order][:, :, order], full_scale).astype(np.float16)
-    # Reversed, so that bright is fresh as on the map.
-    out.fixed("ages", rr.Tensor.from_fields(value_range=[full_scale, 0.0]))
-    # `Tensor.columns` takes no batches in rerun 0.41.
-    tensors = [rr.Tensor(matrix, dim_names=("robot", "about robot")) for matrix in ages]
-    batches = [tensor.as_component_batches()[0] for tensor in tensors]
-    name = batches[0].component_descriptor()
-    column = pa.concat_arrays([batch.as_arrow_array() for batch in batches])
-    out.timed("ages", [rr.ComponentColumn(name, rr.AnyBatchValue(name, column))], log.age_window)
+    shares = np.minimum(log.age[:, order][:, :, order] / full_scale, 1.0)
+    shades = np.rint(OLDEST * shares).astype(np.uint8)
+    ages = np.linspace(0.0, full_scale, OLDEST + 1)
+    names = [f"{age:.0f} windows" for age in ages[:-1]] + [f"{full_scale:g} windows or more"]
+    colours = palette.age_colours(ages, full_scale)
+    _draw_classes(out, "ages", shades[0].shape, zip(names, colours, strict=True), TREE)
+    columns = rr.SegmentationImage.columns(buffer=shades.reshape(len(shades), -1))
+    out.timed("ages", columns, log.age_window)
 
 
 def draw_states(out: RerunLog) -> None:
-    """Draw a lane per robot: what it did with the radio, logged when it changes."""
-    facts = out.log.facts
-    colours = palette.BROADCAST_STATES if facts.is_broadcast else palette.ADDRESSED_STATES
-    names = np.array(list(colours))
-    state = radio_states(out.log)
-    # Silence is hidden: lanes would otherwise be full of it. Labels are blank, for they are cut
-    # off where a state lasts a few windows only; the view's name has their colours.
-    configuration = rr.StateConfiguration(
-        values=names,
-        labels=[" "] * len(names),
-        visible=names != palette.SILENT,
-        colors=np.array(list(colours.values()), dtype=np.uint8),
-    )
-    for i, lane in enumerate(state.T):
-        path = f"state/r{i:03d}"
-        out.fixed(path, configuration)
-        # A lane keeps its state until the next change, so that one row per window is not needed.
-        changes = np.flatnonzero(np.append(True, lane[1:] != lane[:-1]))
-        out.timed(path, rr.StateChange.columns(state=lane[changes]), out.log.window[changes])
+    """Draw a row per robot: what it did with the radio in each window; a line marks this one."""
+    log = out.log
+    colours = palette.BROADCAST_STATES if log.facts.is_broadcast else palette.ADDRESSED_STATES
+    state = radio_states(log).T
+    _draw_classes(out, "state", state.shape, colours.items(), STATES)
+    shades = np.argmax([state == name for name in colours], axis=0).astype(np.uint8)
+    out.fixed("state", rr.SegmentationImage.from_fields(buffer=shades.tobytes()))
+    num_robots, num_windows = state.shape
+    rows = np.arange(num_windows)
+    top, bottom = (np.stack([rows + 0.5, np.full(num_windows, y)], axis=1) for y in (0, num_robots))
+    out.lines("state/now", top, bottom, rows)
+    left, above = (-BESIDE * size for size in (num_windows, num_robots))
+    robots = range(0, num_robots, max(1, num_robots // NUM_NAMES))
+    # rerun writes below a point.
+    names, places = [f"r{i}" for i in robots], [(left, i + 0.5 + above) for i in robots]
+    out.words("state/robots", names, places)
+    every = max(1, int(palette.nice_top(num_windows / NUM_TICKS)))
+    ticks = np.flatnonzero(log.window % every == 0).tolist()
+    names = [str(log.window[k]) for k in ticks]
+    out.words("state/windows", names, [(k + 0.5, 2.0 * above) for k in ticks])
+
+
+def _draw_classes(
+    out: RerunLog,
+    path: str,
+    shape: tuple[int, ...],
+    classes: Iterable[tuple[str, Any]],
+    size: tuple[float, float],
+) -> None:
+    """Prepare an image of classes, each with its name and colour, as large as this in its view.
+
+    rerun's own views of tensors and of states write over them, and show short states as grey.
+    """
+    out.fixed(path, rr.AnnotationContext([(k, *named) for k, named in enumerate(classes)]))
+    (height, width), (x, y) = shape, size
+    form = rr.components.ImageFormat(height=height, width=width, channel_datatype="U8")
+    out.fixed(path, rr.SegmentationImage.from_fields(format=form, opacity=1.0))
+    out.fixed(path, rr.Transform3D(mat3x3=np.diag([x / width, y / height, 1.0])))
 
 
 def radio_states(log: Log) -> Shaped[np.ndarray, "T N"]:

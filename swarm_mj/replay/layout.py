@@ -9,7 +9,7 @@ import rerun as rr
 import rerun.blueprint as rrb
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.charts import TREE_HEIGHT, TREE_WIDTH, PlotCurve, plots
+from swarm_mj.replay.charts import STATES, TREE, PlotCurve, plots
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import PIECES, WHOLE, by_kind
 from swarm_mj.replay.recorder import Log
@@ -58,11 +58,10 @@ def layout(log: Log, ground: Ground) -> Layout:
         "/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"], **_hidden("arena")
     )
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
-    across, up = ((-0.05 * size, 1.05 * size) for size in (TREE_WIDTH, TREE_HEIGHT))
+    across, up = ((-0.05 * size, 1.05 * size) for size in TREE)
     tree = _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up)
-    mapping = rrb.TensorScalarMapping(colormap="Viridis", mag_filter="Nearest")
-    ages = "Age of information, all pairs"
-    matrix = rrb.TensorView(origin="/ages", name=ages, scalar_mapping=mapping, view_fit="Fill")
+    ages = "Ages: rows about columns"
+    matrix = _drawing("/", ages, (0.0, TREE[0]), (0.0, TREE[1]), contents=["/ages"])
     charts = [_plot(name, curves) for name, curves in plots(log).items()]
     mission = rrb.Horizontal(
         rrb.Vertical(map_view, samples, row_shares=[4, height / (ROW + LAST)]),
@@ -71,8 +70,9 @@ def layout(log: Log, ground: Ground) -> Layout:
         name="Mission",
     )
     states = OF_BROADCASTS if log.facts.is_broadcast else OF_ADDRESSED
+    across, up = ((-0.07 * size, 1.02 * size) for size in STATES)
     radio = rrb.Horizontal(
-        rrb.StateTimelineView(origin="/state", name=f"Radio of every robot: {states}"),
+        _drawing("/", f"Radio of every robot: {states}", across, up, contents=["/state/**"]),
         rrb.TextDocumentView(origin="/about", name="About this mission"),
         column_shares=[3, 1],
         name="Radio",
@@ -141,15 +141,15 @@ def draw_legend(out: RerunLog) -> None:
     colours = palette.age_colours(np.linspace(0.0, full_scale, NUM_SHADES), full_scale)
     out.fixed("legend/ramp", rr.LineStrips2D(strips, colors=colours, radii=-5.0))
     texts = ["0", f"{full_scale / 2:g}", f"{full_scale:g} windows"]
-    _write(out, "legend/ages", texts, [(LEFT + at * RAMP, BELOW) for at in (0.0, 0.5, 0.95)])
+    out.words("legend/ages", texts, [(LEFT + at * RAMP, BELOW) for at in (0.0, 0.5, 0.95)])
     about = f"age of what r{out.log.ego} knows"
-    _write(out, "legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW)])
+    out.words("legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW)])
     for row, samples in enumerate(_samples(out.log)):
         for column, (text, layer) in enumerate(samples.items()):
             x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * _row_height(out.log)
             path = "legend/" + re.sub(r"\W", "_", text)
             _draw_sample(out, path, layer, x, y)
-            _write(out, f"{path}/text", [text], [(x, y + BELOW)])
+            out.words(f"{path}/text", [text], [(x, y + BELOW)])
 
 
 def legend_height(log: Log) -> float:
@@ -196,8 +196,3 @@ def _draw_sample(out: RerunLog, path: str, name: str, x: float, y: float) -> Non
     }
     colour = {"colors": [palette.MISMATCH[kind]]} if kind in palette.MISMATCH else {}
     out.fixed(path, layer.kind.from_fields(**layer.style, **colour, **shapes[layer.kind]))
-
-
-def _write(out: RerunLog, path: str, texts: list[str], places: list[tuple[float, float]]) -> None:
-    style = {"show_labels": True, "radii": -0.1, "colors": [palette.TEXT]}  # points are not seen
-    out.fixed(path, rr.Points2D.from_fields(positions=places, labels=texts, **style))

@@ -1,6 +1,6 @@
 """A replay as rerun's recording: how each entity looks, and its rows on the mission's timelines."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -64,6 +64,7 @@ LAYERS = {
     "tree/hops": EntityStyle(rr.LineStrips2D, palette.GRID, 0.5, 0.0),
     "tree/edges": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 1.0),
     "tree/nodes": EntityStyle(rr.Points2D, None, 4.5, 2.0),
+    "state/now": EntityStyle(rr.LineStrips2D, palette.TEXT, 0.6, 1.0),
     "scene/grid": EntityStyle(rr.LineStrips3D, palette.OUTLINE, 0.5),
     "scene/heading": EntityStyle(rr.LineStrips3D, palette.HEADING, 0.8),
     "scene/world/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
@@ -114,6 +115,11 @@ class RerunLog:
         """Write things of a layer that never change, by the fields of the layer's archetype."""
         layer = LAYERS[path]
         self.fixed(path, layer.kind.from_fields(**layer.style, **fields))
+
+    def words(self, path: str, texts: list[str], places: Sequence[tuple[float, float]]) -> None:
+        """Write texts that never change at places in 2-D, as labels of points that are not seen."""
+        style = {"show_labels": True, "radii": -0.1, "colors": [palette.TEXT]}
+        self.fixed(path, rr.Points2D.from_fields(positions=places, labels=texts, **style))
 
     def layer(self, path: str, row: np.ndarray | None = None, **columns: np.ndarray) -> None:
         """Write things of a layer that change, by its archetype's fields; `row` as for `things`."""

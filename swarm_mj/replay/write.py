@@ -1,6 +1,7 @@
 """Writes a log as a rerun recording: what moves on the map and in 3-D, and all else around it."""
 
 import json
+import re
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -20,8 +21,6 @@ from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import draw_stage
 from swarm_mj.system.writing import write_bytes
-
-APPLICATION = "swarm_mj"
 
 TRAIL_WINDOWS = 150
 TRAIL_STRIDE = 15
@@ -50,7 +49,7 @@ def write_replay(log: Log, config: Mapping[str, Any], path: Path) -> None:
 def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
     ground = frame(log.position_m, log.facts.mission.half_side_m)
-    with rr.RecordingStream(APPLICATION, send_properties=False) as recording:
+    with rr.RecordingStream(_application(log), send_properties=False) as recording:
         stream = recording.binary_stream()
         laid_out = layout(log, ground)
         # Active, for rerun's page in a browser ignores one that is a default only.
@@ -66,6 +65,20 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
         about = "\n".join([f"# {name}", *_about(log, config)])
         out.fixed("about", rr.TextDocument(about, media_type="text/markdown"))
     return stream.read() or b""
+
+
+def _application(log: Log) -> str:
+    """Return the name of a kind of replay.
+
+    Of replays with one name that are opened together, rerun gives all the layout of the last.
+    """
+    mission = log.facts.mission
+    packets = "broadcasts" if log.facts.is_broadcast else "addressed packets"
+    parts = [mission.task, f"{mission.num_robots} robots", f"{mission.side_m:.0f} m", packets]
+    parts += ["beyond free space"] if log.is_compared else []
+    parts += [log.task_cost.name] if log.task_cost else []
+    name = " - ".join([*parts, f"seen by r{log.ego}", "swarm_mj"])
+    return re.sub(r"[^a-zA-Z0-9 _-]", "-", name)  # rerun warns of other characters
 
 
 def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:

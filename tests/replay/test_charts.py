@@ -5,6 +5,7 @@ import pytest
 from reading import column, rows, static
 
 from swarm_mj.replay.charts import dendrogram, plots, radio_states
+from swarm_mj.replay.palette import age_colours
 
 
 @pytest.mark.parametrize("flight", ["two_way", "flooded"])
@@ -25,33 +26,51 @@ def test_states_follow_a_plain_reading_of_the_log(flight, request):
         assert states[t, i] == expected
 
 
-def test_lanes_show_all_states_but_silence(replay):
-    names, shown = (
-        static(replay, "/state/r000", f"StateConfiguration:{of}") for of in ("values", "visible")
-    )
-    assert dict(zip(names.tolist(), shown.tolist(), strict=True)) == {
-        "silent": False,
-        "overhears": True,
-        "answers": True,
-        "is lost": True,
-        "delivers": True,
-    }
+@pytest.mark.parametrize(("name", "flight"), [("replay", "two_way"), ("flood_replay", "flooded")])
+def test_each_robot_has_a_row_and_each_state_its_name(name, flight, request):
+    path, log = request.getfixturevalue(name), request.getfixturevalue(flight).log
+    context = static(path, "/state", "AnnotationContext:context")
+    names = np.array([each["class_description"]["info"]["label"] for each in context])
+    shown = static(path, "/state", "SegmentationImage:buffer").reshape(12, len(log.window))
+    np.testing.assert_array_equal(names[shown].T, radio_states(log))
+
+
+def test_a_line_marks_the_window_that_is_shown(replay, two_way):
+    ends = rows(replay, "/state/now", "LineStrips2D:strips", 2, 2)
+    k = np.arange(len(two_way.log.window))
+    np.testing.assert_array_equal(ends[:, 0, 0], k + 0.5)  # amid the pixels of each
+    np.testing.assert_array_equal(ends[:, 1], np.stack([k + 0.5, np.full(len(k), 12)], axis=1))
 
 
 def test_rows_of_the_matrix_own_and_columns_are_owned(replay, two_way):
     """The ego robot's row, wherever the walk put it, is what the ego robot knows."""
-    tensors = column(replay, "/ages", "Tensor:data").flatten().to_pylist()
-    matrices = np.stack([np.array(tensor["buffer"]) for tensor in tensors])
-    full_scale, log = matrices.max(), two_way.log
+    log, full_scale = two_way.log, two_way.log.facts.full_scale
+    shades = rows(replay, "/ages", "SegmentationImage:buffer", 12, 12)
+    a_shade = full_scale / 255.0
     # Rows and columns are permuted alike, so that the ages agree as a set.
-    expected = np.minimum(log.age.reshape(len(matrices), -1), full_scale)
-    np.testing.assert_array_equal(np.sort(matrices, axis=1), np.sort(expected, axis=1))
-    shown = np.sort(matrices[-1].reshape(12, 12), axis=1).tolist()
-    own = np.sort(np.minimum(log.ego_age[-1], full_scale)).astype(np.float16).tolist()
-    about = np.sort(np.minimum(log.age[-1, :, log.ego], full_scale)).tolist()
-    assert own in shown
-    assert about not in shown
-    assert about in np.sort(matrices[-1].reshape(12, 12).T, axis=1).tolist()
+    shown, ages = (np.sort(x.reshape(len(shades), -1), axis=1) for x in (shades, log.age))
+    expected = np.minimum(ages, full_scale)
+    np.testing.assert_allclose(shown * a_shade, expected, atol=0.51 * a_shade)
+    in_rows = np.sort(shades[-1], axis=1).tolist()
+    in_columns = np.sort(shades[-1].T, axis=1).tolist()
+    own, about = (
+        np.sort(np.rint(np.minimum(age, full_scale) / a_shade)).tolist()
+        for age in (log.ego_age[-1], log.age[-1, :, log.ego])
+    )
+    assert own in in_rows
+    assert about not in in_rows
+    assert about in in_columns
+
+
+def test_the_matrix_wears_the_colours_of_the_map(replay, two_way):
+    context = static(replay, "/ages", "AnnotationContext:context")
+    named = [each["class_description"]["info"] for each in context]
+    full_scale = two_way.log.facts.full_scale
+    assert named[0]["label"] == "0 windows"
+    assert named[-1]["label"] == f"{full_scale:g} windows or more"
+    rgb = [(each["color"] >> shift) & 255 for each in named for shift in (24, 16, 8)]
+    ages = np.linspace(0.0, full_scale, len(named))
+    np.testing.assert_array_equal(np.reshape(rgb, (-1, 3)), age_colours(ages, full_scale))
 
 
 def test_a_small_tree_by_hand():

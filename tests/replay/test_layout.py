@@ -22,7 +22,7 @@ EVERYWHERE = {
     "Map, squares of 100 m",
     "Legend",
     "Tree of r4, in hops",
-    "Age of information, all pairs",
+    "Ages: rows about columns",
     "Age of information [windows]: team ± std (green), r4 (white)",
     "Scene in 3-D, colours as on the map",
     "About this mission",

@@ -8,7 +8,15 @@ from reading import column, entities, static
 from swarm_mj.replay.rerun_log import LAYERS
 from swarm_mj.replay.write import write_replay
 
-DRAWN = ("/arena/", "/tree/", "/scene/grid", "/scene/heading", "/scene/packets", "/scene/world")
+DRAWN = (
+    "/arena/",
+    "/tree/",
+    "/state/now",
+    "/scene/grid",
+    "/scene/heading",
+    "/scene/packets",
+    "/scene/world",
+)
 OTHERS = {"scene/world/cut_off"}  # solids, whose width is in metres
 
 

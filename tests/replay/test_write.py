@@ -1,5 +1,6 @@
 """Replays are whole or not there; their robots, packets and links are the flight's."""
 
+import re
 import subprocess
 import sys
 from dataclasses import replace
@@ -7,7 +8,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from reading import colours, column, counts, entities, rows, static
+from rerun.chunk import RrdReader
 
+from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import palette
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.write import write_replay
@@ -18,10 +21,30 @@ ROBOTS = np.arange(12)
 
 
 def test_what_has_no_layer_is_there_and_rerun_s_own_verifier_accepts_the_file(replay):
-    shown = {"/legend/ramp", "/ages", "/plots/age/ego", "/state/r000", "/about"}
+    shown = {"/legend/ramp", "/ages", "/plots/age/ego", "/state", "/about"}
     assert entities(replay) >= shown
     command = [sys.executable, "-m", "rerun", "rrd", "verify", str(replay)]
     assert subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+def test_replays_of_one_kind_share_a_layout_and_others_have_their_own(
+    replay, flood_replay, still_replay, blocked_replay, two_way, tmp_path
+):
+    """rerun gives all recordings of one application the layout of the last."""
+    names = [kind_of(each) for each in (replay, flood_replay, still_replay, blocked_replay)]
+    assert len(set(names)) == 4
+    write_replay(two_way.log, {"seed": 6}, tmp_path / "b.rrd")
+    assert kind_of(tmp_path / "b.rrd") == names[0]
+    cost = TaskCost(name="distance, in metres", unit="m", value=two_way.log.age_mean)
+    write_replay(replace(two_way.log, task_cost=cost), {"seed": 5}, tmp_path / "c.rrd")
+    assert kind_of(tmp_path / "c.rrd") not in names
+
+
+def kind_of(path):
+    """The name of the application; rerun warns of characters other than these."""
+    (recording,) = RrdReader(path).recordings()
+    assert re.fullmatch("[a-zA-Z0-9 _-]+", recording.application_id)
+    return recording.application_id
 
 
 def test_the_config_is_kept_as_properties(replay):
