@@ -1,6 +1,5 @@
 """A notebook as a page of the documentation, with what its cells show when they are run now."""
 
-import os
 import tempfile
 from collections.abc import Callable
 from functools import cache
@@ -37,7 +36,6 @@ def page_of(path: Path) -> str:
         for cell in notebook.cells:
             if RENDERS in cell.metadata.get("tags", ()):
                 cell.cell_type, cell.source = "markdown", f"```python\n{cell.source}\n```"
-    os.environ.pop("MPLBACKEND", None)  # charts are shown in the page, whatever else draws them
     with tempfile.TemporaryDirectory() as folder:
         client = NotebookClient(
             notebook,

@@ -16,11 +16,12 @@ from swarm_mj.api.charts import kept
 from swarm_mj.evaluation.figures.style import CAPTION, escape_mathtext, styled
 from swarm_mj.mission.presets import where_flown
 from swarm_mj.physics.arenas import obstacles_of
+from swarm_mj.physics.outlines import footprints
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
-from swarm_mj.system.packages import need, version
+from swarm_mj.system.packages import version
 
 WIDTH_IN, HEIGHT_IN, DPI = 12.8, 7.2, 150  # 1920 by 1080 pixels
 MAP_IN, LEFT_IN, BOTTOM_IN = 6.3, 0.85, 0.6  # the map's side, and where it stands
@@ -43,7 +44,6 @@ def draw_picture(footage: Footage, window: int | None = None) -> Figure:
 
     Raises:
         ValueError: There is no such window.
-        ModuleNotFoundError: The mission has obstacles, and rerun is not installed.
     """
     row = _row(footage, window)
     with styled():
@@ -81,24 +81,23 @@ def _size_pt(footage: Footage) -> float:
 
 
 def _trails(footage: Footage, row: int) -> Float[np.ndarray, "P N 2"]:
-    """Return where the robots were in the last windows, the oldest first [m]."""
-    return footage.position_m[max(0, row - TRAIL_WINDOWS) : row + 1]
+    """Return where the robots were in the last windows, the oldest first; at rest in one [m]."""
+    first = max(0, row - TRAIL_WINDOWS) if footage.has_motion else row
+    return footage.position_m[first : row + 1]
 
 
 def _frame(axes: Axes, footage: Footage, row: int) -> float:
     """Set the map's limits around area, robots and trails; return a robot's radius on it [m]."""
-    mission, trails_m = footage.facts.mission, _trails(footage, row)
-    if not footage.has_motion:
-        trails_m = trails_m[-1:]
-    ground = frame(trails_m.reshape(1, -1, 2), mission.half_side_m)
+    trails_m = _trails(footage, row).reshape(1, -1, 2)
+    ground = frame(trails_m, footage.facts.mission.half_side_m)
     (x, y), reach_m = ground.centre_m[0], MARGIN * ground.reach_m
     axes.set(xlim=(x - reach_m, x + reach_m), ylim=(y - reach_m, y + reach_m), aspect="equal")
     axes.set_facecolor(_rgb(palette.BACKGROUND))
     axes.grid(color=_rgb(palette.GRID), linewidth=0.8)
-    axes.set_xlabel("x [m]", fontsize=TEXT_PT, color=_rgb(palette.SENT))
-    axes.set_ylabel("y [m]", fontsize=TEXT_PT, color=_rgb(palette.SENT))
-    faint = _rgb(palette.WALL)
-    axes.tick_params(colors=faint, labelcolor=_rgb(palette.SENT), labelsize=SMALL_PT)
+    faint, grey = _rgb(palette.WALL), _rgb(palette.SENT)
+    axes.set_xlabel("x [m]", fontsize=TEXT_PT, color=grey)
+    axes.set_ylabel("y [m]", fontsize=TEXT_PT, color=grey)
+    axes.tick_params(colors=faint, labelcolor=grey, labelsize=SMALL_PT)
     axes.spines[:].set(visible=True, color=_rgb(palette.OUTLINE))
     return reach_m * _size_pt(footage) / (POINTS_PER_IN * MAP_IN)
 
@@ -106,24 +105,17 @@ def _frame(axes: Axes, footage: Footage, row: int) -> float:
 def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     """Draw area and obstacles; return samples for the legend."""
     mission = footage.facts.mission
-    half_m, style = mission.half_side_m, "-" if mission.has_walls else "--"
-    line: dict[str, Any] = {
-        "edgecolor": _rgb(palette.WALL),
-        "linestyle": style,
-        "linewidth": 1.2,
-        "zorder": 1.0,
-    }
-    axes.add_patch(Rectangle((-half_m, -half_m), 2 * half_m, 2 * half_m, fill=False, **line))
-    wall: dict[str, Any] = {"color": _rgb(palette.WALL), "linestyle": style, "linewidth": 1.2}
-    shown = [Line2D([], [], label="wall of the area" if mission.has_walls else "area", **wall)]
+    low_m, side_m = -mission.half_side_m, mission.side_m
+    line: dict[str, Any] = {"linestyle": "-" if mission.has_walls else "--", "linewidth": 1.2}
+    line["color"] = _rgb(palette.WALL)
+    axes.add_patch(Rectangle((low_m, low_m), side_m, side_m, fill=False, zorder=1.0, **line))
+    shown = [Line2D([], [], label="wall of the area" if mission.has_walls else "area", **line)]
     obstacles = obstacles_of(compose(mission, scene=footage.scene).compile())
     if len(obstacles.kind) > 0:
-        need("rerun", "a picture with obstacles")
-        from swarm_mj.replay.stage import footprints
-
-        fill: dict[str, Any] = {"facecolor": _rgb(palette.OUTLINE), "edgecolor": _rgb(palette.WALL)}
+        inside, edge = _rgb(palette.OUTLINE), _rgb(palette.WALL)
         for outline_m in footprints(obstacles, ROBOT_HEIGHT_M):
-            axes.add_patch(Polygon(outline_m, linewidth=0.8, zorder=1.5, **fill))
+            block = Polygon(outline_m, facecolor=inside, edgecolor=edge, linewidth=0.8, zorder=1.5)
+            axes.add_patch(block)
         shown.append(_dot("obstacle", palette.OUTLINE, "s", palette.WALL))
     return shown
 
@@ -134,16 +126,10 @@ def _draw_trails(axes: Axes, footage: Footage, row: int) -> Line2D:
     colours = footage.colours[row] / 255.0
     for k, alpha in enumerate(np.linspace(FAINTEST, BRIGHTEST, PIECES)):
         piece_m = trails_m[edges[k] : edges[k + 1] + 1].swapaxes(0, 1)
-        if piece_m.shape[1] > 1:
-            style: dict[str, Any] = {
-                "colors": colours,
-                "alpha": alpha,
-                "linewidth": 1.6,
-                "zorder": 2.0,
-            }
-            axes.add_collection(LineCollection(list(piece_m), **style), autolim=False)
-    seconds = (len(trails_m) - 1) * footage.facts.mission.window_s
-    label = f"trail of the last {seconds:g} s"
+        lines = LineCollection(list(piece_m), colors=colours, linewidth=1.6, zorder=2.0)
+        lines.set_alpha(alpha)
+        axes.add_collection(lines, autolim=False)
+    label = f"trail of the last {(len(trails_m) - 1) * footage.facts.mission.window_s:g} s"
     return Line2D([], [], color=_rgb(palette.SENT), alpha=BRIGHTEST, linewidth=1.6, label=label)
 
 
@@ -154,14 +140,13 @@ def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
     off = footage.is_cut_off[row]
     if np.any(off):
         axes.scatter(x[off], y[off], s=3.2 * size, color=_rgb(palette.CUT_OFF), zorder=3.0)
-    edge = _rgb(palette.BACKGROUND)
-    style: dict[str, Any] = {"edgecolors": [edge], "linewidths": 0.8, "zorder": 4.0}
-    axes.scatter(x, y, s=size, c=footage.colours[row] / 255.0, **style)
-    own = footage.ego
+    colours, edge = footage.colours[row] / 255.0, _rgb(palette.BACKGROUND)
+    axes.scatter(x, y, s=size, c=colours, edgecolors=edge, linewidths=0.8, zorder=4.0)
+    own, beside_pt = footage.ego, 0.7 * _size_pt(footage)
     axes.annotate(
         f"r{own}",
         (x[own], y[own]),
-        (0.7 * _size_pt(footage), 0.7 * _size_pt(footage)),
+        (beside_pt, beside_pt),
         textcoords="offset points",
         color=_rgb(palette.EGO),
         fontsize=TEXT_PT,
@@ -191,13 +176,7 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
         rim_m = radius_m * way_m[far] / span_m[far]
         start_m, along_m = packets.start_m[far] + rim_m, way_m[far] - 2.0 * rim_m
         colour = _rgb(palette.PACKETS[fate].colour)
-        how: dict[str, Any] = {
-            "angles": "xy",
-            "scale_units": "xy",
-            "scale": 1.0,
-            "width": 0.0028,
-            "headwidth": 4.5,
-        }
+        how = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0028, "headwidth": 4.5}
         x, y, along_x, along_y = np.hstack([start_m, along_m]).T
         axes.quiver(x, y, along_x, along_y, color=colour, zorder=5.0, alpha=0.9, **how)
         name = FATES.get(fate, f"packet {fate}")
@@ -208,11 +187,9 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
 def _dot(
     label: str, colour: palette.Colour, marker: str = "o", edge: palette.Colour | None = None
 ) -> Line2D:
-    look: dict[str, Any] = {
-        "markerfacecolor": _rgb(colour),
-        "markeredgecolor": _rgb(edge or colour),
-    }
-    return Line2D([], [], linestyle="", marker=marker, markersize=9.0, label=label, **look)
+    dot = Line2D([], [], linestyle="", marker=marker, markersize=9.0, label=label)
+    dot.set(markerfacecolor=_rgb(colour), markeredgecolor=_rgb(edge or colour))
+    return dot
 
 
 def _write(figure: Figure, footage: Footage, row: int) -> float:
@@ -235,9 +212,8 @@ def _write(figure: Figure, footage: Footage, row: int) -> float:
         y_in -= LINE * size / POINTS_PER_IN
         x, y = TEXT_IN / WIDTH_IN, y_in / HEIGHT_IN
         figure.text(x, y, escape_mathtext(text), fontsize=size, color=_rgb(colour))
-    caption = f"swarm_mj {version()}"
     x, y = TEXT_IN / WIDTH_IN, BOTTOM_IN / HEIGHT_IN
-    figure.text(x, y, caption, fontsize=8.0, color=_rgb(palette.WALL), gid=CAPTION)
+    figure.text(x, y, f"swarm_mj {version()}", fontsize=8.0, color=_rgb(palette.WALL), gid=CAPTION)
     return y_in
 
 

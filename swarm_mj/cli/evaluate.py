@@ -15,6 +15,7 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
@@ -26,7 +27,7 @@ from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import plain_console, quiet_matplotlib, tell_cores
+from swarm_mj.system.terminal import plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, owned
 
 

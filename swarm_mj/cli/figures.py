@@ -6,12 +6,13 @@ from pathlib import Path
 
 from rich.console import Console
 
+from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
 from swarm_mj.system.needs import LIBRARIES, YES, Needs, check_fits
-from swarm_mj.system.terminal import plain_console, quiet_matplotlib
+from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help

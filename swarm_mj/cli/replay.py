@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
+from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay import view
 from swarm_mj.replay.view import run as run_viewer
@@ -16,7 +17,7 @@ from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import WorkBar, plain_console, quiet_matplotlib
+from swarm_mj.system.terminal import WorkBar, plain_console
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 if TYPE_CHECKING:

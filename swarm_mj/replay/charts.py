@@ -22,7 +22,7 @@ TREE = (
 )  # width and height of the tree's view, and of the matrix, in units of their own
 STATES = (1400.0, 1000.0)  # of the states, likewise
 OLDEST = 255  # shade of an age in the matrix, from 0
-NUM_NAMES, NUM_TICKS = 20, 6  # about so many robots and windows are named beside the states
+NUM_NAMES, NUM_TICKS = 20, 6  # of robots and windows, about, beside the states
 BESIDE = 0.02  # of the states' width and height: from them to the names
 RATE_WINDOWS = 10  # that packets are counted over
 

@@ -9,20 +9,12 @@ from jaxtyping import Float, UInt8
 from mujoco._enums import mjtTextureRole
 from mujoco._functions import mj_kinematics, mju_mat2Quat
 from mujoco._structs import MjData, MjModel
-from scipy.spatial import ConvexHull
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import loss_db_of, obstacle_geoms, obstacles_of
+from swarm_mj.physics.outlines import footprints
 from swarm_mj.physics.scene import compose
-from swarm_mj.physics.state import (
-    BOX,
-    CAPSULE,
-    CYLINDER,
-    ELLIPSOID,
-    ROBOT_HEIGHT_M,
-    SPHERE,
-    Obstacles,
-)
+from swarm_mj.physics.state import CAPSULE, CYLINDER, ELLIPSOID, ROBOT_HEIGHT_M, SPHERE
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rerun_log import LAYERS, RerunLog
@@ -31,8 +23,6 @@ SQUARE_M = 100.0
 MAX_SQUARES = 60  # across the ground; more would be too small to see
 GRID_M = 0.2  # above the floor
 FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
-CORNERS = 24  # of a circle
-LATITUDES = np.linspace(-0.5 * np.pi, 0.5 * np.pi, 9)  # of a ball's circles
 MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up
 PLANE = 0  # as MuJoCo numbers it
 FLOOR_M = 0.5  # half the thickness of a drawn plane: rerun has solids only
@@ -99,23 +89,6 @@ def grid(ground: Ground) -> list[list[tuple[float, float]]]:
     return [[(x, ys[0]), (x, ys[-1])] for x in xs] + [[(xs[0], y), (xs[-1], y)] for y in ys]
 
 
-def footprints(obstacles: Obstacles, height_m: float) -> list[Float[np.ndarray, "K 2"]]:
-    """Return the outline of each obstacle that reaches this height, once round [m]."""
-    outlines = []
-    for n, kind in enumerate(obstacles.kind):
-        rotation, centre_m = obstacles.rotation[n], obstacles.centre_m[n]
-        points_m = _surface(int(kind), obstacles.size_m[n]) @ rotation.T + centre_m
-        # The outline is the hull of where lines from the points above to those below pass.
-        is_above = points_m[:, 2] > height_m
-        above, below = points_m[is_above][:, None], points_m[~is_above][None]
-        share = (above[..., 2:] - height_m) / (above[..., 2:] - below[..., 2:])
-        cut = (above + share * (below - above))[..., :2].reshape(-1, 2)
-        if len(cut) > 2:
-            corners = cut[ConvexHull(cut).vertices]
-            outlines.append(np.concatenate([corners, corners[:1]]))
-    return outlines
-
-
 def filling(
     outline_m: Float[np.ndarray, "K 2"], apart_m: float
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
@@ -131,20 +104,6 @@ def filling(
         ]
         lines.append(((min(xs), y), (max(xs), y)))
     return lines
-
-
-def _surface(kind: int, size_m: Float[np.ndarray, "3"]) -> Float[np.ndarray, "K 3"]:
-    """Return points whose convex hull is the obstacle, in its own frame [m]."""
-    if kind == BOX:
-        return size_m * np.array(list(itertools.product((-1.0, 1.0), repeat=3)))
-    angle = np.linspace(0.0, 2.0 * np.pi, CORNERS, endpoint=False)
-    circle = np.stack([np.cos(angle), np.sin(angle), np.zeros(CORNERS)], axis=1)
-    ball = np.concatenate([np.cos(at) * circle + (0.0, 0.0, np.sin(at)) for at in LATITUDES])
-    if kind in (CYLINDER, CAPSULE):
-        half = np.array([0.0, 0.0, size_m[1]])
-        disc = size_m[0] * (circle if kind == CYLINDER else ball)
-        return np.concatenate([disc - half, disc + half])
-    return ball * (size_m if np.all(size_m > 0.0) else size_m[0])
 
 
 def static_geoms(model: MjModel) -> dict[str, list[rr.AsComponents]]:

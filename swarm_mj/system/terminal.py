@@ -1,6 +1,5 @@
 """Text, tables and the bar of long work on a terminal, and the names of programs."""
 
-import logging
 import os
 import shutil
 import sys
@@ -18,12 +17,6 @@ SPEED_OVER_S = 600.0  # several rollouts of a training, and evaluations between 
 def plain_console(*, is_error: bool = False) -> Console:
     """Return a terminal that shows text as it is: no colours, no broken lines, no markup."""
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
-
-
-def quiet_matplotlib() -> None:
-    """Have matplotlib, before it is imported, open no window and not warn of its cache."""
-    os.environ["MPLBACKEND"] = "Agg"
-    logging.getLogger("matplotlib").setLevel(logging.ERROR)
 
 
 def is_notebook() -> bool:

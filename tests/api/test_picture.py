@@ -1,5 +1,8 @@
 """Pictures of one window, against what was recorded of it."""
 
+import subprocess
+import sys
+
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
@@ -92,6 +95,15 @@ def test_obstacles_and_the_channel_are_shown():
     figure = swarm_mj.fly("random-walk", policy="gossip", **city).picture()
     assert len(of_kind(figure.axes[0], Polygon)) == 16  # blocks, 4 by 4
     assert "preset urban" in texts(figure)
+
+
+def test_obstacles_are_drawn_without_rerun():
+    """In a process of its own, for others here import it."""
+    code = (
+        "import sys, swarm_mj; sys.modules['rerun'] = None; "
+        "swarm_mj.fly('random-walk', policy='gossip', preset='urban', num_windows=2).picture()"
+    )
+    subprocess.run([sys.executable, "-c", code], check=True)
 
 
 def test_no_such_window_and_nothing_recorded_are_refused(run):

@@ -1,5 +1,6 @@
 """Looks differ from each other for every eye; files are whole, valid and the same every time."""
 
+import os
 from itertools import combinations
 from xml.etree import ElementTree
 
@@ -10,6 +11,7 @@ from matplotlib.colors import to_rgb
 from PIL import Image
 from synthetic import everything
 
+from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.drawing import draw
 from swarm_mj.evaluation.figures.style import LOOKS, save, styled
 from swarm_mj.evaluation.published import DRAWN, FORMATS, RESULT_FIGURES
@@ -74,3 +76,11 @@ def test_the_users_own_settings_are_neither_used_nor_changed():
         with styled():
             assert mpl.rcParams["font.size"] == 9.0
         assert mpl.rcParams["font.size"] == 33.0
+
+
+def test_commands_open_no_window_and_leave_the_environment_to_others(monkeypatch):
+    monkeypatch.setenv("MPLBACKEND", "svg")
+    with mpl.rc_context({"backend": "svg"}):
+        quiet_matplotlib()
+        assert mpl.get_backend().lower() == "agg"
+    assert os.environ["MPLBACKEND"] == "svg"
