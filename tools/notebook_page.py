@@ -1,11 +1,15 @@
 """A notebook as a page of the documentation, with what its cells show when they are run now."""
 
+import base64
+import io
+import re
 import tempfile
 from collections.abc import Callable
 from functools import cache
 from pathlib import Path
 from typing import Any
 
+import av
 import nbformat
 from nbclient import NotebookClient
 
@@ -71,8 +75,22 @@ def _shown(output: Any) -> str:  # noqa: ANN401 - a notebook's node
     return FORMS[best](output.data[best])
 
 
+def _with_poster(html: str) -> str:
+    """Give an embedded film its middle picture to show until it plays."""
+    found = FILM.search(html)
+    if found is None:
+        return html
+    with av.open(io.BytesIO(base64.b64decode(found[1])), "r") as film:
+        frames = [frame.to_image() for frame in film.decode(video=0)]
+    poster = io.BytesIO()
+    frames[len(frames) // 2].save(poster, format="jpeg", quality=80)
+    picture = base64.b64encode(poster.getvalue()).decode()
+    return html.replace("<video", f'<video poster="data:image/jpeg;base64,{picture}"', 1)
+
+
+FILM = re.compile(r'src="data:video/mp4;base64,([^"]+)"')
 FORMS: dict[str, Callable[[str], str]] = {  # the first that there is, is shown
-    "text/html": lambda html: f'<div class="output">\n{html}\n</div>',
+    "text/html": lambda html: f'<div class="output">\n{_with_poster(html)}\n</div>',
     "image/png": lambda png: f'<img alt="" src="data:image/png;base64,{"".join(png.split())}">',
     "text/plain": lambda text: f"```text\n{text}\n```",
 }

@@ -1,9 +1,18 @@
 """Notebooks as pages: texts, code and what the code shows; a cell that fails fails the page."""
 
+import base64
+import io
+import re
+
 import nbformat
+import numpy as np
 import pytest
 from nbclient.exceptions import CellExecutionError
 from notebook_page import page_of
+from PIL import Image
+
+from swarm_mj.replay.rendering.video import encode_mp4
+from swarm_mj.replay.view import VideoStyle
 
 CELLS = {
     "both": "print('said')\n1 + 1",
@@ -45,3 +54,20 @@ def test_without_opengl_cells_that_render_are_not_run(tmp_path, monkeypatch):
 def test_a_cell_that_fails_is_an_error(tmp_path):
     with pytest.raises(CellExecutionError, match="division by zero"):
         page_of(notebook(tmp_path / "a.ipynb", "1 / 0"))
+
+
+def test_a_film_shows_its_middle_until_it_plays(tmp_path):
+    """Ten pictures, each brighter than the one before."""
+    pictures = (np.full((64, 64, 3), 25 * k, np.uint8) for k in range(10))
+    film = encode_mp4(pictures, VideoStyle(width=64, height=64, seconds=1.0, fps=10))
+    (tmp_path / "a.mp4").write_bytes(film)
+    how = "embed=True, mimetype='video/mp4'"
+    path = tmp_path / "a.mp4"
+    page = page_of(
+        notebook(
+            tmp_path / "a.ipynb", f"from IPython.display import Video\nVideo({str(path)!r}, {how})"
+        )
+    )
+    (poster,) = re.findall(r'<video poster="data:image/jpeg;base64,([^"]+)"', page)
+    shown = np.asarray(Image.open(io.BytesIO(base64.b64decode(poster))).convert("L"), float)
+    assert shown.mean() == pytest.approx(125.0, abs=8.0)
