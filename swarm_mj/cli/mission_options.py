@@ -22,6 +22,7 @@ TUNED = "tuned for the regime"
 # What most people set: `--help` shows these, and `--help-all` the others, too.
 COMMON = ("preset", "task", "num_robots", "range_ratio", "num_windows", "arena")
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
+USUAL = paper("flocking"), paper("stationary")  # whose defaults are shown
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -117,8 +118,7 @@ def _mission_options(*, is_many: bool = False) -> Iterator[Field[Any]]:
 
 def _default_of(spec: Field[Any]) -> str:
     """Return a mission's default; where it depends on the task, the flock's and the others'."""
-    tasks = ("flocking", "stationary")
-    flocks, others = (as_typed(getattr(paper(task), spec.name)) for task in tasks)
+    flocks, others = (as_typed(getattr(mission, spec.name)) for mission in USUAL)
     if spec.name == "task":
         return f"{flocks}; {PRESETS[next(iter(WORLDS))]().task} under {', '.join(WORLDS)}"
     if flocks == others:

@@ -108,7 +108,7 @@ def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> 
     )
 
 
-@compiled()
+@compiled(forceinline=True)
 def chance(links: Links, ratio: float, i: int, j: int) -> float:
     """Return the probability that j decodes i at this SINR, linear [1]."""
     if links.curves.shape[0] == 0:
@@ -140,7 +140,7 @@ def incoming_with(links: Links, air: Air, i: int, j: int) -> Incoming:
     return add_packet(incoming_at(air, j), i, signal_mw, interference_mw)
 
 
-@compiled()
+@compiled(forceinline=True)
 def chance_of_strongest(links: Links, incoming: Incoming, j: int) -> float:
     """Return the probability that j decodes the strongest packet."""
     others_mw = incoming.total - links.interference_mw[incoming.sender, j]

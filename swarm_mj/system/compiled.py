@@ -20,6 +20,8 @@ from pathlib import Path
 from typing import Any, TypeVar, cast
 
 from numba.core import caching, config, types
+from numba.core.codegen import JITCodeLibrary
+from numba.core.compiler import Compiler
 from numba.core.event import Event, Listener, install_listener
 from numba.core.registry import CPUDispatcher
 from numba.core.runtime.nrt import rtsys
@@ -32,14 +34,17 @@ IMPORT = re.compile(r"^from (\w+(?:\.\w+)*) import ", re.MULTILINE)
 Function = TypeVar("Function", bound=Callable[..., Any])
 
 
-def compiled(*, fastmath: bool | set[str] = False) -> Callable[[Function], Function]:
+def compiled(
+    *, fastmath: bool | set[str] = False, forceinline: bool = False
+) -> Callable[[Function], Function]:
     """Compile a function when it is first called with arguments of new types.
 
     numba compiles a function with its first caller's assumptions on floats, `fastmath`, unless they
-    are said, so here they always are. Type checkers see the function as it was.
+    are said, so here they always are. `forceinline` makes callers take it in: a call with many
+    arrays takes longer than a short function. Type checkers see the function as it was.
     """
     # Checks for divisions by zero would keep loops that divide from being as fast as they can be.
-    options = {"nopython": True, "fastmath": fastmath, "error_model": "numpy"}
+    options = dict(nopython=True, fastmath=fastmath, error_model="numpy", forceinline=forceinline)
 
     def decorate(function: Function) -> Function:
         plain = inspect.unwrap(function)  # of the checks that tests put around all functions
@@ -60,7 +65,7 @@ class _Loop(CPUDispatcher):
         options = {**options, "no_cfunc_wrapper": True}
         super().__init__(function, targetoptions=options)
         options = {**options, "no_cpython_wrapper": True}
-        self.inner = CPUDispatcher(function, targetoptions=options)
+        self.inner = CPUDispatcher(function, targetoptions=options, pipeline_class=_PartCompiler)
         numba: Any = config
         before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
         with suppress(RuntimeError):  # no place for a cache
@@ -79,7 +84,44 @@ class _Loop(CPUDispatcher):
         LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
         made, and the process fails later, or crashes when it ends.
         """
-        return super().compile(sig)
+        entry = super().compile(sig)
+        for result in self.overloads.values():
+            for env in result._find_referenced_environments():
+                result.library.codegen.set_env(env.env_name, env)
+        return entry
+
+
+class _PartCompiler(Compiler):
+    """Compiles a part of functions that call it."""
+
+    def define_pipelines(self) -> Any:  # noqa: ANN401 - numba's
+        """Name the library that the part goes to, and leave the rest as it is."""
+        state = self.state
+        state.library = _Part(state.targetctx.codegen(), state.func_id.func_qualname)
+        return super().define_pipelines()
+
+
+class _Part(JITCodeLibrary):
+    """Code that is optimised and made a machine's where it is called, and not before.
+
+    By itself nobody calls it, and to optimise it alone, then again in every caller and in theirs,
+    takes half of the time.
+    """
+
+    def _optimize_final_module(self) -> None:
+        """Leave that to the function that it becomes a part of."""
+
+    def _finalize_final_module(self) -> None:
+        self._finalize_dynamic_globals()
+        self._finalized = True
+
+    @property
+    def codegen(self) -> Any:  # noqa: ANN401 - numba's
+        """Who is asked to note the constants of what can run: here nobody."""
+        return self
+
+    def set_env(self, name: str, env: object) -> None:
+        """Wait for the function that this becomes a part of."""
 
 
 class _Cache(caching.FunctionCache):

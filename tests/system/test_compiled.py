@@ -5,12 +5,13 @@ import shutil
 import subprocess
 import sys
 from pathlib import Path
+from typing import Any, cast
 
 import pytest
 
 import swarm_mj.system.compiled
 import swarm_mj.system.interrupt
-from swarm_mj.system.compiled import _read, sources_digest
+from swarm_mj.system.compiled import _read, compiled, sources_digest
 
 PHYSICS = """
 from typing import NamedTuple
@@ -183,6 +184,30 @@ def test_what_compiled_functions_call_is_not_compiled_for_python(checkout):
     """From the cache, it is a part of its caller, and nothing that compiles is imported for it."""
     assert checkout.python(PARTS).split() == ["True", "0", "1", "4.0"]
     assert checkout.python(PARTS).split() == ["False", "0", "0", "4.0"]
+
+
+def test_a_part_is_made_a_machines_in_its_caller_alone():
+    """An error in it reaches Python all the same."""
+
+    @compiled(forceinline=True)
+    def root(x: float) -> float:
+        if x < 0.0:
+            raise ValueError("below 0")
+        return x**0.5
+
+    @compiled()
+    def sum_of_roots(x: float, y: float) -> float:
+        return root(x) + root(y)
+
+    assert sum_of_roots(4.0, 9.0) == 5.0
+    with pytest.raises(ValueError, match="below 0"):
+        sum_of_roots(4.0, -1.0)
+    of_root, of_sum = cast(Any, root), cast(Any, sum_of_roots)
+    (part,), (whole,) = of_root.inner.overloads.values(), of_sum.overloads.values()
+    for result, is_machines in ((part, False), (whole, True)):
+        name = result.fndesc.mangled_name
+        assert bool(result.library.get_pointer_to_function(name)) == is_machines
+    assert "alwaysinline" in part.library.get_llvm_str()
 
 
 def test_what_is_compiled_is_counted_as_it_begins(checkout):
