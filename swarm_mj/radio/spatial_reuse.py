@@ -151,38 +151,47 @@ def _senders(
         compute_powers(powers, b, last)
     _join(owner, belief, slot)
     # A robot that may not join the owner alone may not join it with others either.
-    if last != NOBODY and not _may_join(last, belief, slot):
+    if last != NOBODY and _refuser(last, owner, belief, slot) != NOBODY:
         return is_sender
+    refuser = owner
     for k in asked:
         # A sender that is asked again may not join either: nobody would gain by it.
         if powers is not None and slot.signal[k] == 0.0:
             compute_powers(powers, b, k)
-        if _may_join(k, belief, slot):
+        found = _refuser(k, refuser, belief, slot)
+        if found == NOBODY:
             _join(k, belief, slot)
+        elif found != k:
+            refuser = found
         if k == last:
             break
     return is_sender
 
 
 @compiled()
-def _may_join(k: int, belief: _Belief, slot: _Slot) -> bool:
-    """Return whether nobody would lose a packet and somebody would gain one if k sent, too."""
+def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
+    """Return who would lose a packet if k sent, too; k itself if nobody would gain one; or NOBODY.
+
+    The `first` is looked at first: who is in the way of one robot is likely to be in the way of
+    the next, and nearly all robots are refused.
+    """
     is_sender, signal, total = slot
     if signal[k] > 0.0:
-        return False
+        return k
     is_of_use = False
-    for j in range(signal.shape[0]):
+    for n in range(-1, signal.shape[0]):
+        j = first if n < 0 else n
         if j != k and not is_sender[j]:
             power = _power(k, j, belief)
             if signal[j] > 0.0:
                 if power > signal[j]:
-                    return False
+                    return j
                 interference = total[j] - signal[j] + power
                 if not is_received(sinr(signal[j], interference, NOISE), belief.threshold):
-                    return False
+                    return j
             elif is_received(sinr(power, total[j], NOISE), belief.threshold):
                 is_of_use = True
-    return is_of_use
+    return NOBODY if is_of_use else k
 
 
 @compiled()

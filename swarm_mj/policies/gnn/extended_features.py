@@ -188,7 +188,7 @@ def _write_beliefs(
     num_missions, num_robots = is_known.shape[:2]
     # Columns of their own, with which the inner loops are compiled to vectors.
     x_m, y_m, is_close = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots)
-    known = np.empty(num_robots, np.int64)
+    known_x_m, known_y_m = np.empty(num_robots), np.empty(num_robots)
     for b in range(num_missions):
         for i in range(num_robots):
             its, last = node[b, i], node[b, i - 1]
@@ -198,15 +198,17 @@ def _write_beliefs(
                     of_k.neighbours, of_k.has_turn_1_5 = same.neighbours, same.has_turn_1_5
                     of_k.has_turn_2, of_k.has_turn_3 = same.has_turn_2, same.has_turn_3
                 continue
+            num_known = 0
             for k in range(num_robots):
                 x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
-                known[k] = is_known[b, i, k]
+                known_x_m[num_known], known_y_m[num_known] = x_m[k], y_m[k]
+                num_known += is_known[b, i, k]  # else the next one takes its place
             for k in range(num_robots):
-                count = -1  # for it finds itself
-                for j in range(num_robots):
-                    dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
-                    count += known[j] * (dx * dx + dy * dy <= range_m * range_m)
-                its[k].neighbours = count * known[k] / CROWD
+                count = 0
+                for n in range(num_known if is_known[b, i, k] else 0):
+                    dx, dy = known_x_m[n] - x_m[k], known_y_m[n] - y_m[k]
+                    count += 1 if dx * dx + dy * dy <= range_m * range_m else 0
+                its[k].neighbours = max(count - 1, 0) / CROWD  # for it finds itself
             whom = is_known[b, i]
             write_turns(x_m, y_m, whom, window[b], 1.5 * range_m, its["has_turn_1_5"], is_close)
             write_turns(x_m, y_m, whom, window[b], 2.0 * range_m, its["has_turn_2"], is_close)
