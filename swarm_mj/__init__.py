@@ -46,6 +46,8 @@ is seen), `envs` (interfaces of other libraries), `api` (Python in five lines; i
 as well), `cli` (the command line).
 """
 
+import signal
+import sys
 from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
@@ -117,5 +119,11 @@ def __dir__() -> list[str]:
     return sorted({*globals(), *__all__, "__version__"})
 
 
-if find_spec("gymnasium"):  # whose `make` then knows the environments; else nobody asks for them
+_started = [*sys.orig_argv, "", ""][1:3]
+_is_command = _started[0].endswith("swarm-mj") or _started == ["-m", "swarm_mj"]
+if not _is_command and find_spec("gymnasium"):  # whose `make` then knows the environments
     import_module("swarm_mj.envs").register_environments()
+if _is_command and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+    # Nothing has begun: Ctrl-C ends the process at once and silently until `cli.main` hears it. An
+    # exception would be swallowed by some of what is loaded.
+    signal.signal(signal.SIGINT, signal.SIG_DFL)

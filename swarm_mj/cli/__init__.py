@@ -16,10 +16,8 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, NoReturn
 
-from swarm_mj.cli.options import Parser, parse_options
-from swarm_mj.mission.components import one_line_each
+# All else is imported by functions that `main` calls, which hears Ctrl-C while modules load.
 from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
-from swarm_mj.system.fields import did_you_mean
 from swarm_mj.system.interrupt import INTERRUPTS, interruptible
 from swarm_mj.system.streams import lasting_streams
 
@@ -55,11 +53,11 @@ def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
         _show_or_refuse(arguments)
     from rich.console import Console
 
+    from swarm_mj.cli.options import parse_options
     from swarm_mj.replay.rendering.opengl import check_choice
 
     name = arguments[0]
     check_choice()  # before something imports MuJoCo
-    # The command is imported here, not above, so that Ctrl-C is heard while modules load.
     with Console(stderr=True).status("Loading ..."):
         command = importlib.import_module(f"swarm_mj.cli.{name}")
     kind = getattr(command, f"{name.title()}Options")
@@ -98,6 +96,8 @@ def script(
 
     `kind` is the dataclass of its options; the docstring of that module says what it does.
     """
+    from swarm_mj.cli.options import parse_options
+
     module = sys.modules[kind.__module__]
     name = Path(str(module.__file__)).stem
     typed = sys.argv[1:] if arguments is None else list(arguments)
@@ -107,6 +107,8 @@ def script(
 
 def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
     """Print the overview or the version, or refuse a line that names no command."""
+    from swarm_mj.cli.options import Parser
+    from swarm_mj.system.fields import did_you_mean
     from swarm_mj.system.packages import version
 
     begin_with = {f"{NAME} {command}": meaning for command, meaning in BEGINNING.items()}
@@ -148,6 +150,8 @@ def _exit_code(name: str, work: Callable[[], int]) -> int:
 def _outcome(work: Callable[[], int], was_interrupted: Callable[[], bool]) -> tuple[int, str]:
     """Return the exit code of some work, and the line to print of an error."""
     try:
+        from swarm_mj.mission.components import one_line_each
+
         with one_line_each():
             return work(), ""
     except SystemExit as end:  # of help, or of a line that cannot be read

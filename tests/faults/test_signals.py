@@ -1,7 +1,11 @@
 """Signals at random moments leave what a Ctrl-C leaves; a reader that goes away leaves all."""
 
+import os
 import random
 import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pytest
@@ -74,6 +78,48 @@ def test_a_training_can_be_resumed(forks, random_tries):
         if "run/settings.json" in left:
             done = forks.run(folder, "swarm_mj", *TRAINING[:3], "--resume", "--budget", 1)
             assert done.returncode == 0, done.stderr
+
+
+def pressed(folder, delay_s, *arguments):
+    """Runs a command that gets Ctrl-C so long after its package began to load; returns its end."""
+    with subprocess.Popen(
+        [sys.executable, "-m", "swarm_mj", *map(str, arguments)],
+        cwd=folder,
+        env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"},  # which says when it has loaded
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+        preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
+    ) as process:
+        while not process.stderr.readline().endswith(" swarm_mj\n"):
+            assert process.poll() is None
+        time.sleep(delay_s)
+        process.send_signal(signal.SIGINT)
+        said = process.communicate(timeout=100.0)[1]
+        lines = [line for line in said.splitlines() if not line.startswith("import time:")]
+    return process.returncode, "\n".join(lines)
+
+
+@pytest.mark.fault("signals")
+@pytest.mark.parametrize("command", ["train", "film"])
+def test_a_real_ctrl_c_is_heard_from_the_first_moment_on(forks, tmp_path, tries, command):
+    """A training went on to its end; a film ended with -2, and was there."""
+    flown = tmp_path / "flown"
+    flown.mkdir()
+    film = ("replay", flown / "a.rrd", "--video", "film.mp4")
+    arguments = (*TRAINING, "--budget", 10_000) if command == "train" else film
+    if command == "film":
+        assert forks.run(flown, "swarm_mj", *FLIGHT).returncode == 0
+    rng = random.Random(command)
+    for number in range(tries(4)):
+        own = tmp_path / str(number)
+        own.mkdir()
+        # Until the command line is read, the signal ends the process as it does any other.
+        code, said = pressed(own, rng.uniform(0.0, 1.0 if number % 2 else 0.3), *arguments)
+        assert code in (130, -signal.SIGINT), said
+        assert "Traceback" not in said
+        left = files(own)
+        assert left == [] or "run/settings.json" in left, left
 
 
 @pytest.mark.fault("signals")
