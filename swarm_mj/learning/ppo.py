@@ -21,8 +21,6 @@ from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import recipient_logits
 
-SILENT_SHARE = 0.1  # of the silent rows that are learned from
-
 
 def make_model(training: Training) -> PPO:
     """Make PPO over fresh missions (III-C).
@@ -53,6 +51,7 @@ def make_model(training: Training) -> PPO:
             seed=training.seed % 2**32,
             normalize_advantage=not drops,  # a credit's zero means something
             rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
+            rollout_buffer_kwargs={"silent_share": ppo.silent_share} if drops else None,
             policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
@@ -215,6 +214,10 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
     discount, are learned from these rows, too.
     """
 
+    def __init__(self, *given: Any, silent_share: float, **others: Any) -> None:
+        self._silent_share = silent_share
+        super().__init__(*given, **others)  # sizes and spaces come from PPO
+
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:
         """Advantages and returns are the rewards; what comes later is worth nothing."""
         del last_values, dones
@@ -235,7 +238,8 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
                 setattr(self, name, getattr(self, name).reshape(num_rows, 1))
             self.generator_ready = True
         is_active = self.actions[:, 0] != self.observations["owner"][:, 0]
-        is_kept = is_active | (np.random.random(num_rows) < SILENT_SHARE)  # noqa: NPY002 - as SB3
+        draws = np.random.random(num_rows)  # noqa: NPY002 - as stable-baselines3
+        is_kept = is_active | (draws < self._silent_share)
         kept = np.random.permutation(np.flatnonzero(is_kept))  # noqa: NPY002
         num_batches = max(1, round(num_rows / (batch_size or num_rows)))
         for rows in np.array_split(kept, num_batches):

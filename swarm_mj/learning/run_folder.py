@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from swarm_mj.learning.selection import OTHER_FLIGHTS, num_missions
-from swarm_mj.learning.settings import Training
+from swarm_mj.learning.settings import MAX_DECISIONS, Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
 from swarm_mj.system import needs
@@ -29,7 +29,7 @@ PATIENCE = {"robot": 8, "team": 40}  # evaluations
 KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
 WINDOW_BYTES = 2.0  # of the checkpoint, for each robot and window of a mission
 CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
-MAX_DECISIONS, MAX_EVALUATIONS = 10**12, 1_000_000
+MAX_EVALUATIONS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
 from swarm_mj.policies.policy_config import GnnShape, check_fit
@@ -18,6 +19,7 @@ Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team i
 HELD_OUT_SEED, CHOICE_SEED, TEST_SEED = 500_000, 510_000, 520_000
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
+MAX_DECISIONS = 10**12
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,6 +45,8 @@ class PpoSettings:
     value: float = setting(0.5, low=0.0, high=1.0)  # weight of the value's squared error
     max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)
     adam_epsilon: float = setting(1e-6, low=1e-12, high=1e6)
+    # Of the silent rows, the share that is learned from, where they may be left out.
+    silent_share: float = setting(0.1, low=0.0, high=1.0, may_lack=True)
 
     def __post_init__(self) -> None:
         check(self)
@@ -114,15 +118,13 @@ class Training:
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
-    seed: int = setting(
-        0, "the same seed is the same policy", low=0, high=2**63 - 1, is_common=True
-    )
+    seed: int = setting(0, "the same seed is the same policy", low=0, high=MAX_SEED, is_common=True)
     evaluate_every: int = setting(
         10_000,
         "team decisions between two evaluations",
         label="evaluation interval",
         low=1,
-        high=10**12,
+        high=MAX_DECISIONS,
     )
     held_out: int = setting(
         12,

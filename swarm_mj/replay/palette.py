@@ -38,6 +38,7 @@ ANSWERED: Colour = (86, 180, 233)
 TOO_WEAK: Colour = (232, 70, 94)  # links that policies believe in, but that do not decode
 UNBELIEVED: Colour = (0, 148, 108)  # links that decode, but that policies do not believe in
 CUT_OFF: Colour = (150, 38, 56)
+HALO = 1.7  # the radius around a robot that is cut off, by the robot's
 
 MEAN_AGE: Colour = (53, 183, 121)
 WORST_AGE: Colour = (150, 158, 172)

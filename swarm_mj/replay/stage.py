@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import rerun as rr
 from jaxtyping import Float, UInt8
-from mujoco._enums import mjtTextureRole
+from mujoco._enums import mjtTextureRole  # private: type checkers see it only there
 from mujoco._functions import mj_kinematics, mju_mat2Quat
 from mujoco._structs import MjData, MjModel
 

@@ -30,8 +30,7 @@ RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
 RADIUS_SHARE = 1.4 * RING_SHARE  # of a body in 3-D, likewise
 OBSERVER = 1.3  # times larger
 BODY_HEIGHT = 0.8  # of a body, by its radius
-HALO = 1.7  # the radius around a robot that is cut off, by the robot's
-HALO_M = 2.0  # its height
+HALO_M = 2.0  # height of what surrounds a robot that is cut off
 
 
 def write_replay(log: Log, config: Mapping[str, Any], path: Path) -> None:
@@ -214,7 +213,7 @@ def _draw_mismatch(out: RerunLog, radius_m: float, height_m: float) -> None:
     out.layer("arena/world/cut_off", row, positions=where_m)
     path = "scene/world/cut_off"
     out.fixed(path, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
-    radii = np.full(len(row), HALO * radius_m)
+    radii = np.full(len(row), palette.HALO * radius_m)
     lengths = np.full(len(row), HALO_M)
     halos = rr.Cylinders3D.columns(centers=lifted(where_m, 0.0), radii=radii, lengths=lengths)
     out.things(path, halos, row)

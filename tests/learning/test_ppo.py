@@ -13,7 +13,7 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import SILENT_SHARE, ActiveRolloutBuffer, make_model
+from swarm_mj.learning.ppo import ActiveRolloutBuffer, make_model
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import PRESETS
 
@@ -119,13 +119,15 @@ def test_threads_are_torchs():
 # The rollout without most of the silent rows.
 
 STEPS, ROWS, ROBOTS = 40, 50, 5
+SHARE = 0.2  # of the silent rows
 
 
 def filled(speaks):
     """A buffer of numbered rows, of which those marked spoke; a row's reward is its number."""
     owners, numbers = spaces.Box(0, ROBOTS - 1, (1,), np.int32), spaces.Box(0, 1e4, (1,))
     space = spaces.Dict({"owner": owners, "number": numbers})
-    buffer = ActiveRolloutBuffer(STEPS, space, spaces.Discrete(ROBOTS), device="cpu", n_envs=ROWS)
+    spoken = spaces.Discrete(ROBOTS)
+    buffer = ActiveRolloutBuffer(STEPS, space, spoken, n_envs=ROWS, silent_share=SHARE)
     owner = np.tile(np.arange(ROBOTS, dtype=np.int32), ROWS // ROBOTS)[:, None]
     for step in range(STEPS):
         number = np.arange(step * ROWS, (step + 1) * ROWS, dtype=np.float32)
@@ -134,6 +136,16 @@ def filled(speaks):
         buffer.add(seen, action, number, np.zeros(ROWS), zeros, zeros)
     buffer.compute_returns_and_advantage(torch.zeros(ROWS), np.zeros(ROWS))
     return buffer
+
+
+@pytest.mark.parametrize("share", [0.0, 1.0])
+def test_a_run_says_how_many_of_the_silent_are_kept(share):
+    model = make_model(with_ppo(small_training(), silent_share=share))
+    buffer = model.rollout_buffer
+    buffer.pos, buffer.full = buffer.buffer_size, True  # as filled by rows that are all silent
+    buffer.actions[...] = buffer.observations["owner"]
+    kept = sum(len(batch.actions) for batch in buffer.get(10))
+    assert kept == share * buffer.buffer_size * buffer.n_envs
 
 
 @pytest.fixture
@@ -153,8 +165,8 @@ def test_all_speakers_and_a_share_of_the_silent_are_kept(speaks):
     assert spoke <= set(kept)
     num_silent = STEPS * ROWS - len(spoke)
     share = (len(kept) - len(spoke)) / num_silent
-    error = np.sqrt(SILENT_SHARE * (1 - SILENT_SHARE) / num_silent)
-    assert abs(share - SILENT_SHARE) < 4.0 * error
+    error = np.sqrt(SHARE * (1 - SHARE) / num_silent)
+    assert abs(share - SHARE) < 4.0 * error
 
 
 def test_every_pass_keeps_others_of_the_silent_in_another_order(speaks):

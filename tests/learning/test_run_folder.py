@@ -42,6 +42,14 @@ def test_a_run_is_read_as_it_was_written(tmp_path, monkeypatch):
         assert read_run(tmp_path / "run") == run
 
 
+def test_runs_from_before_the_share_of_silent_rows_was_a_setting_go_on(tmp_path):
+    write_run(tmp_path, RUN)
+    whole = json.loads((tmp_path / SETTINGS).read_text())
+    assert whole["training"]["ppo"].pop("silent_share") == 0.1
+    (tmp_path / SETTINGS).write_text(json.dumps(whole))
+    assert read_run(tmp_path) == RUN
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"format": "swarm_mj policy"}'])
 def test_what_is_no_settings_is_refused(tmp_path, text):
     (tmp_path / SETTINGS).write_text(text)

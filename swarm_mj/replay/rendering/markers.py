@@ -8,7 +8,7 @@ from typing import NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Float
-from mujoco._enums import mjtCamera, mjtGeom
+from mujoco._enums import mjtCamera, mjtGeom  # private: type checkers see it only there
 from mujoco._functions import mjv_connector, mjv_initGeom
 from mujoco._structs import MjvCamera, MjvGeom, MjvScene
 
@@ -32,7 +32,7 @@ HEADING, LINE = 0.022, 0.0025  # a length and a width
 SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
 NO_TURN, NOWHERE = np.eye(3).ravel(), np.zeros(3)
-HALO, HALO_HEIGHT = 1.7, 0.15  # of a robot that is cut off, by the robot's
+HALO_HEIGHT = 0.15  # around a robot that is cut off, by its radius
 LINES_PER_ROBOT = 40  # mismatched links; of very dense teams, some are left out
 # A disc, a heading, a halo, arcs of all that a window can have, and lines.
 GEOMS_PER_ROBOT = 3 + 4 * SEGMENTS + LINES_PER_ROBOT
@@ -117,8 +117,8 @@ def _draw_robots(
         height_m = ROBOT_HEIGHT * radius_m
         _add_disc(scene, np.append(where, height_m), radius_m, radius_m, colours[i])
         if footage.is_cut_off[row, i]:
-            flat_m = HALO_HEIGHT * radius_m
-            _add_disc(scene, np.append(where, flat_m), HALO * radius_m, flat_m, palette.CUT_OFF)
+            flat_m, wide_m = HALO_HEIGHT * radius_m, palette.HALO * radius_m
+            _add_disc(scene, np.append(where, flat_m), wide_m, flat_m, palette.CUT_OFF)
         if np.any(way):
             start, end = np.append(where, height_m), np.append(where + way, height_m)
             _add_line(scene, start, end, palette.HEADING, line_pixels)

@@ -6,18 +6,11 @@ import warnings
 from contextlib import AbstractContextManager
 from weakref import ref
 
+import mujoco._functions as functions  # private: type checkers see it only there
 import numpy as np
 from jaxtyping import UInt8
 from mujoco._enums import mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._errors import FatalError
-from mujoco._functions import (
-    mj_camlight,
-    mj_comPos,
-    mj_forward,
-    mj_kinematics,
-    mj_name2id,
-    mjv_updateScene,
-)
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
 from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvScene
 
@@ -25,13 +18,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import obstacle_geoms
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.replay.footage import Footage
-from swarm_mj.replay.rendering.markers import (
-    FOV_Y_DEG,
-    GEOMS_PER_ROBOT,
-    Camera,
-    draw_markers,
-    look_at,
-)
+from swarm_mj.replay.rendering import markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
 
 MAX_PIXELS = 4096  # of a picture's side
@@ -67,8 +54,8 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
         self._size, self._mission = (width, height), mission
         self._model = pictured(mission, scene, width, height)
         self._data = MjData(self._model)
-        self._floor = mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
-        num_geoms = self._model.ngeom + mission.num_robots * GEOMS_PER_ROBOT
+        self._floor = functions.mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
+        num_geoms = self._model.ngeom + mission.num_robots * markers.GEOMS_PER_ROBOT
         self._scene = MjvScene(self._model, num_geoms)
         self._options = MjvOption()
         self._options.geomgroup[BEACONS] = 0
@@ -83,9 +70,9 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
         self._is_open = True
         atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
 
-    def camera(self, footage: Footage, row: int = 0) -> Camera:
+    def camera(self, footage: Footage, row: int = 0) -> markers.Camera:
         """Return the camera by which a window's picture is seen."""
-        return look_at(footage.ground, row, *self._size)
+        return markers.look_at(footage.ground, row, *self._size)
 
     def frame(self, footage: Footage, row: int = 0) -> UInt8[np.ndarray, "H W 3"]:
         """Return the picture of a window, counted from 0: RGB, its first row on top.
@@ -97,9 +84,9 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
             raise ValueError(f"footage must have {self._mission.num_robots} robots, not {num}")
         data = self._data
         data.qpos[:] = footage.position_m[row].ravel()
-        mj_kinematics(self._model, data)
-        mj_comPos(self._model, data)
-        mj_camlight(self._model, data)
+        functions.mj_kinematics(self._model, data)
+        functions.mj_comPos(self._model, data)
+        functions.mj_camlight(self._model, data)
         if not self._mission.has_walls and self._floor >= 0:
             # By whole tiles, so that the pattern stands still under a team that flies on.
             tiles = np.round(footage.ground.centre_m[row] / TILE_M)
@@ -107,8 +94,10 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
         camera, free = self.camera(footage, row), MjvCamera()
         camera.aim(free)
         everything = mjtCatBit.mjCAT_ALL.value
-        mjv_updateScene(self._model, data, self._options, None, free, everything, self._scene)
-        draw_markers(self._scene, footage, row, camera)
+        functions.mjv_updateScene(
+            self._model, data, self._options, None, free, everything, self._scene
+        )
+        markers.draw_markers(self._scene, footage, row, camera)
         picture = np.empty((height, width, 3), np.uint8)
         whole = MjrRect(0, 0, width, height)
         self._opengl.make_current()  # there may be other renderers
@@ -155,7 +144,7 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
     model = spec.compile()
     visual = model.vis
     visual.global_.offwidth, visual.global_.offheight = width, height
-    visual.global_.fovy = FOV_Y_DEG
+    visual.global_.fovy = markers.FOV_Y_DEG
     visual.quality.numslices, visual.quality.numstacks = SLICES, STACKS
     visual.headlight.ambient[:], visual.headlight.diffuse[:] = AMBIENT, 0.0
     model.light_diffuse[:], model.light_ambient[:] = SUN, 0.0
@@ -202,16 +191,16 @@ class SceneViewer:
         """Show the footage's first window from now on."""
         if not self._window.is_running():
             return
-        camera = look_at(footage.ground, 0, *WINDOW)
+        camera = markers.look_at(footage.ground, 0, *WINDOW)
         with self._window.lock():
             if not self._is_aimed:  # from then on it is the user's
                 camera.aim(self._window.cam)
                 self._window.opt.geomgroup[BEACONS] = 0
                 self._is_aimed = True
             self._data.qpos[:] = footage.position_m[0].ravel()
-            mj_forward(self._model, self._data)
+            functions.mj_forward(self._model, self._data)
             self._markers.ngeom = 0
-            draw_markers(self._markers, footage, 0, camera)
+            markers.draw_markers(self._markers, footage, 0, camera)
         self._window.sync()
 
     def close(self) -> None:

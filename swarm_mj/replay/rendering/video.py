@@ -18,13 +18,7 @@ from PIL import Image, ImageDraw
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import lifted
-from swarm_mj.replay.rendering.drawing import (
-    AgePlot,
-    Box,
-    draw_legend,
-    draw_shortfalls,
-    draw_title,
-)
+from swarm_mj.replay.rendering import drawing
 from swarm_mj.replay.rendering.scene import SceneRenderer
 from swarm_mj.replay.view import DEFAULTS, GIF, MAX_MISSIONS, VideoStyle, fitted
 
@@ -58,16 +52,18 @@ class Movie(ExitStack):
         self._num_frames, width, height = style.num_frames, style.width, style.height
         bottom = height - round(STRIPS[len(footages) - 1] * height)
         edges = np.linspace(0, width, len(footages) + 1).round().astype(int).tolist()
-        self._boxes = [Box(left, 0, right, bottom) for left, right in itertools.pairwise(edges)]
+        self._boxes = [
+            drawing.Box(left, 0, right, bottom) for left, right in itertools.pairwise(edges)
+        ]
         self._text = max(9, round(min(TEXT * height, 0.05 * self._boxes[0].right)))
         pad = self._text // 2
         middle, top = pad + round(LEGEND * width), bottom + pad
-        legend = Box(pad, top, middle - 2 * pad, height - pad)
-        right = Box(middle, top, width - 2 * pad, height - pad)
-        self._plot = AgePlot(footages, right, self._text)
+        legend = drawing.Box(pad, top, middle - 2 * pad, height - pad)
+        right = drawing.Box(middle, top, width - 2 * pad, height - pad)
+        self._plot = drawing.AgePlot(footages, right, self._text)
         self._empty = Image.new("RGB", (width, height), palette.BACKGROUND)
         draw = ImageDraw.Draw(self._empty)
-        draw_legend(draw, self._footages, legend, self._text)
+        drawing.draw_legend(draw, self._footages, legend, self._text)
         self._plot.draw_axes(draw)
         with ExitStack() as opened:  # closes the first renderer if the second does not start
             self._renderers = [
@@ -96,10 +92,10 @@ class Movie(ExitStack):
         )
         for footage, row, box, renderer, curve in parts:
             picture.paste(Image.fromarray(renderer.frame(footage, row)), (box.left, box.top))
-            draw_title(draw, footage, row, box, self._text, curve)
+            drawing.draw_title(draw, footage, row, box, self._text, curve)
             ground_m = lifted(footage.position_m[row], 0.0)
             robots = renderer.camera(footage, row).pixels(ground_m) + np.array(box[:2])
-            draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text)
+            drawing.draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text)
         for box in self._boxes[1:]:
             draw.line((box.left, 0, box.left, box.bottom), palette.BACKGROUND, SEAM)
         self._plot.draw_until(draw, rows)
