@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Int
-from mujoco._functions import mj_step
+from mujoco._functions import mj_step  # private: type checkers see it only there
 from mujoco._structs import MjData
 
 from swarm_mj.evaluation.batch import fly_batch

@@ -238,8 +238,7 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
                 setattr(self, name, getattr(self, name).reshape(num_rows, 1))
             self.generator_ready = True
         is_active = self.actions[:, 0] != self.observations["owner"][:, 0]
-        draws = np.random.random(num_rows)  # noqa: NPY002 - as stable-baselines3
-        is_kept = is_active | (draws < self._silent_share)
+        is_kept = is_active | (np.random.random(num_rows) < self._silent_share)  # noqa: NPY002
         kept = np.random.permutation(np.flatnonzero(is_kept))  # noqa: NPY002
         num_batches = max(1, round(num_rows / (batch_size or num_rows)))
         for rows in np.array_split(kept, num_batches):

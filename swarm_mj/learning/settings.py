@@ -45,8 +45,7 @@ class PpoSettings:
     value: float = setting(0.5, low=0.0, high=1.0)  # weight of the value's squared error
     max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)
     adam_epsilon: float = setting(1e-6, low=1e-12, high=1e6)
-    # Of the silent rows, the share that is learned from, where they may be left out.
-    silent_share: float = setting(0.1, low=0.0, high=1.0, may_lack=True)
+    silent_share: float = setting(0.1, low=0.0, high=1.0, may_lack=True)  # of silent rows
 
     def __post_init__(self) -> None:
         check(self)

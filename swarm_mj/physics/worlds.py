@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool, Float
 from mujoco import batch
-from mujoco._structs import MjModel
+from mujoco._structs import MjModel  # private: type checkers see it only there
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import obstacles_of

@@ -12,16 +12,8 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
+from swarm_mj.replay import links
 from swarm_mj.replay.footage import Facts, Footage, frame, shown_ground
-from swarm_mj.replay.links import (
-    NO_MISMATCH,
-    LinkMismatch,
-    RadioSnapshot,
-    fates,
-    is_other,
-    radio_snapshot,
-    stride_of,
-)
 from swarm_mj.replay.palette import nice_scale
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
@@ -79,7 +71,7 @@ class Log(Footage):
     def is_transmitter(self) -> Bool[np.ndarray, "T N"]:
         """True if a robot sent a request, or a broadcast in either phase."""
         num_phases = 2 if self.facts.is_broadcast else 1
-        return np.any(is_other(self.recipient)[:, :num_phases], axis=1)
+        return np.any(links.is_other(self.recipient)[:, :num_phases], axis=1)
 
     @property
     def is_other_known(self) -> Bool[np.ndarray, "T N"]:
@@ -108,12 +100,12 @@ class Recorder:
         check_observer(ego, num_robots)
         matrices_bytes = AGE_BYTES * num_robots**2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
-        self._radio_stride = stride_of(swarm, self._stride)
+        self._radio_stride = links.stride_of(swarm, self._stride)
         self._swarm, self._ego, self._index = swarm, ego, index
         self._rows: list[dict[str, np.ndarray]] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
-        self._snapshots: list[RadioSnapshot] = []  # none in free space
+        self._snapshots: list[links.RadioSnapshot] = []  # none in free space
 
     def add(self, flown: WindowRecord | None = None) -> None:
         """Record the window that was just flown, if any, with its costs, if they are known."""
@@ -126,7 +118,7 @@ class Recorder:
         if len(self._rows) % self._stride == 0:
             self._age.append(age.astype(np.float32))
         is_due = len(self._rows) % self._radio_stride == 0
-        if is_due and (snapshot := radio_snapshot(swarm, index)) is not None:
+        if is_due and (snapshot := links.radio_snapshot(swarm, index)) is not None:
             self._snapshots.append(snapshot)
         age_mean = velocity_variance = np.nan
         if flown is not None:
@@ -179,7 +171,7 @@ class Recorder:
         return Log(
             facts=facts,
             window=window,
-            packets=fates(
+            packets=links.fates(
                 columns["recipient"],
                 columns["heard"],
                 columns["position_m"],
@@ -212,12 +204,12 @@ class Recorder:
         """
         window = np.arange(1, len(is_on) + 1)[:: self._radio_stride]
         snapshots = self._snapshots[: len(window)]
-        is_cut_off, mismatch = np.zeros_like(is_on), NO_MISMATCH
+        is_cut_off, mismatch = np.zeros_like(is_on), links.NO_MISMATCH
         if snapshots:
             for row, snapshot in enumerate(snapshots):
                 snapshot.links["row"] = row
-            links = np.concatenate([snapshot.links for snapshot in snapshots])
-            mismatch = LinkMismatch(window, links)
+            rows = np.concatenate([snapshot.links for snapshot in snapshots])
+            mismatch = links.LinkMismatch(window, rows)
             group = np.stack([snapshot.group for snapshot in snapshots])
             group = group[np.arange(len(is_on)) // self._radio_stride]
             is_apart = group != group[:, [self._ego]]

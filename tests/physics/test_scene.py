@@ -3,7 +3,16 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.physics.scene import compose, num_substeps, timestep_s
+from swarm_mj.physics.scene import (
+    BEACON_RADIUS_M,
+    ROBOT_MASS_KG,
+    SQUARES_PER_M,
+    WALL_HALF_HEIGHT_M,
+    WALL_HALF_THICKNESS_M,
+    compose,
+    num_substeps,
+    timestep_s,
+)
 from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.packages import asset
 
@@ -97,6 +106,19 @@ def test_a_viewer_opens_on_the_start_and_its_keyframe_flies_on(tmp_path, physics
     mujoco.mj_step(model, data, num_substeps(mission))
     moved_m = start.position_m[0] + 0.1 * start.velocity_mps[0]
     np.testing.assert_allclose(data.qpos.reshape(3, 2), moved_m)
+
+
+def test_python_and_the_files_of_mjcf_agree():
+    """Python repeats these sizes, as arrays are made of them without MuJoCo."""
+    robot = mujoco.MjModel.from_xml_path(str(asset("robot.xml")))
+    assert robot.geom("hull").size[0] == ROBOT_RADIUS_M
+    assert robot.geom("beacon").size[0] == BEACON_RADIUS_M
+    assert robot.body("body").mass == ROBOT_MASS_KG
+    arena = mujoco.MjModel.from_xml_path(str(asset("arena.xml")))
+    size_m = arena.geom("wall_east").size
+    assert (size_m[0], size_m[2]) == (WALL_HALF_THICKNESS_M, WALL_HALF_HEIGHT_M)
+    repeats = arena.material("floor").texrepeat
+    np.testing.assert_allclose(repeats, 2 * arena.geom("floor").size[:2] * SQUARES_PER_M)
 
 
 @pytest.mark.parametrize("num_robots", [2, 10, 40, 90, 160])
