@@ -138,7 +138,7 @@ def draw(curves: Curves, origin: str) -> Figure:
         )
         seeds = ", ".join(f"{len(its)} of {kind}" for kind, its in curves.items())
         caption = f"Held-out missions; seeds: {seeds}; each and their mean; {origin}"
-        write_caption(drawing, 0.075, 0.03, caption)
+        write_caption(drawing, caption, 0.075, 0.03)
     return drawing
 
 

@@ -12,12 +12,13 @@ from matplotlib.figure import Figure, SubFigure
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures.style import (
-    CAPTION,
     FAINT,
     WIDTH_IN,
+    code,
     escape_mathtext,
     look_of,
     styled,
+    write_caption,
 )
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 from swarm_mj.evaluation.table import missions_of
@@ -29,7 +30,6 @@ TITLE_PT = 10.0
 LINE_IN, CHARACTERS = 0.16, 92  # of a title
 FOOT_IN = 0.2
 UNHEARD = "#eef0f4"  # behind the windows before everyone has heard of everyone
-SHORT = 7  # of a commit's digits
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
 
@@ -88,7 +88,7 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
             said = escape_mathtext("\n".join(title))
             part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
             _draw_policies(part, sorted(shown, key=lambda result: result.aoi_mean))
-        figure.supxlabel(_origin(results), x=0.01, ha="left", fontsize=7, color=FAINT, gid=CAPTION)
+        write_caption(figure, _origin(results))
     return kept(figure)
 
 
@@ -118,10 +118,7 @@ def _origin(results: Sequence[Result]) -> str:
         said += ", and its 95 % interval"
     if any(map(carries_more, results)):
         said += f"; +: packets {CARRIES_MORE}"
-    code = f"swarm_mj {first.version}" + (
-        f", commit {first.commit[:SHORT]}" if first.commit else ""
-    )
-    return escape_mathtext(f"{said}; {code}")
+    return f"{said}; {code(first.version, first.commit)}"
 
 
 def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:

@@ -6,7 +6,7 @@ the flight.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.envs.mission_batch import COSTS
+from swarm_mj.evaluation.batch import BatchCosts, costs_of
 from swarm_mj.evaluation.summary import standard_error
 from swarm_mj.learning import selection
 from swarm_mj.learning.selection import COMPARED, JUDGED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
@@ -26,13 +26,12 @@ from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import GnnPolicy
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 
-Flown = list[list[WindowCosts]]  # by team size, window by window
-Samples = list[Float[np.ndarray, "*window B"]]  # by team size
+Flown = list[BatchCosts]  # by team size
+Samples = list[Float[np.ndarray, "B"]]  # by team size
 MakePolicy = Callable[[Mission], Policy]
 OnWindow = Callable[[float], None]
 
@@ -44,23 +43,24 @@ class Flights:
     training: Training
     on_window: OnWindow
     total: int = 1  # flights, at most
-    num_done: int = 0
+    num_windows: int = 0  # flown
 
     def fly(self, policy_of: MakePolicy, first_seed: int, num_missions: int) -> Flown:
         """Fly as many missions of each team size, from a seed on; return their costs."""
         flown: Flown = []
-        sizes, components = self.training.robots, self.training.components
-        for n, num_robots in enumerate(sizes):
+        for num_robots in self.training.robots:
             mission = replace(self.training.mission, num_robots=num_robots)
             seeds = range(first_seed, first_seed + num_missions)
-            swarm, policy = Swarm(mission, seeds, **components.given), policy_of(mission)
-            flown.append([])
-            for window in range(1, mission.num_windows + 1):
-                flown[-1].append(swarm.step(policy))
-                share = (n + window / mission.num_windows) / len(sizes)
-                self.on_window((self.num_done + share) / self.total)
-        self.num_done += 1
+            swarm = Swarm(mission, seeds, **self.training.components.given)
+            flown.append(costs_of(swarm, self._reported(rollout(swarm, policy_of(mission)))))
         return flown
+
+    def _reported(self, flown: Iterator[WindowRecord]) -> Iterator[WindowRecord]:
+        in_all = self.total * len(self.training.robots) * self.training.mission.num_windows
+        for window in flown:
+            yield window
+            self.num_windows += 1
+            self.on_window(self.num_windows / in_all)
 
 
 def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> GnnPolicy:
@@ -92,7 +92,7 @@ def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWin
     for name, num_missions in flown_by.items():
         flown = flights.fly(partial(make_policy, name), HELD_OUT_SEED, num_missions)
         for cost in JUDGED:
-            columns[selection.column(cost, name)] = _mean(_per_mission(flown, cost))
+            columns[selection.column(cost, name)] = _mean(_samples(flown, cost))
     return columns
 
 
@@ -115,12 +115,12 @@ def choose(
 
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
     costs = flights.fly(flies(kept), TEST_SEED, size)
-    own = _per_mission(costs, training.reward)
+    own = _samples(costs, training.reward)
     compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
     others = {
-        name: _per_mission(flights.fly(policy_of, TEST_SEED, size), training.reward)
+        name: _samples(flights.fly(policy_of, TEST_SEED, size), training.reward)
         for name, policy_of in compared.items()
     }
     choice = Choice(
@@ -176,26 +176,23 @@ def _means(training: Training, costs: Flown) -> Row:
     is_aged = training.reward == "aoi"
     # Ages grow with the team; divided by its size, no size outweighs the others.
     objective = [a / n for a, n in zip(age, training.robots, strict=True)] if is_aged else variance
-    packets = [window.packets for windows in costs for window in windows]
-    attempted = sum(int(each.attempted.sum()) for each in packets)
-    error = _standard_error(_per_mission(costs, "aoi"))
+    sent = sum(float(each.packets_sent.sum()) for each in costs)
+    delivered = sum(float(each.packets_delivered.sum()) for each in costs)
+    num_windows = training.mission.num_windows * sum(each.aoi.size for each in costs)
+    error = _standard_error(age)
     return {
         "aoi": _mean(age),
         **({} if error is None else {"aoi_sem": error}),
-        "aoi_steady": _mean([each[len(each) // 2 :] for each in age]),
+        "aoi_steady": _mean([each.aoi_steady for each in costs]),
         "velocity_variance": _mean(variance),
-        "packets_per_window": attempted / sum(each.size for each in age),
-        "delivery_ratio": sum(int(each.delivered.sum()) for each in packets) / max(1, attempted),
+        "packets_per_window": sent / num_windows,
+        "delivery_ratio": delivered / max(1.0, sent),
         "objective": _mean(objective),
     }
 
 
 def _samples(costs: Flown, cost: str) -> Samples:
-    return [np.array([getattr(each, COSTS[cost]) for each in windows]) for windows in costs]
-
-
-def _per_mission(costs: Flown, cost: str) -> Samples:
-    return [each.mean(axis=0) for each in _samples(costs, cost)]
+    return [getattr(each, cost.replace("-", "_")) for each in costs]
 
 
 def _compared(samples: Samples, kept: Samples) -> Cost:

@@ -19,7 +19,7 @@ from swarm_mj.evaluation.figures.curves import (
     curves,
     results_of,
 )
-from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, look_of, styled, write_caption
+from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, look_of, styled, write_caption
 from swarm_mj.evaluation.published import Panel, ResultFigure
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 
@@ -33,7 +33,6 @@ FIXED = {
 RING = 1.6  # a published marker's size, of ours
 HEADROOM = 0.06  # of the axis, beyond the highest and the lowest curve
 PLAIN = "{x:g}"  # a number on an axis
-SHORT = 7  # of a commit's digits
 LINE_IN = 0.165  # from one name to the next
 MORE = "+"  # after the names of methods whose packets carry more than T, M and P
 PLACE = 1.045  # of the axes' width
@@ -81,7 +80,7 @@ def draw_curves(
             name_ends(axes, shown)
         grid[-1, 0].set_xlabel(figure.x_label)
         _head(drawing, figure, found, height_in)
-        write_caption(drawing, LEFT, 0.12 / height_in, caption(figure, found))
+        write_caption(drawing, caption(figure, found), LEFT, 0.12 / height_in)
     return drawing
 
 
@@ -89,12 +88,10 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
     """Return the origin of the numbers, with all commits that made some."""
     result = results[0]
     last = result.seed + result.episodes - 1
-    commits = list(dict.fromkeys(each.commit[:SHORT] for each in results if each.commit))
-    noun = "commit" if len(commits) == 1 else "commits"
-    code = f"swarm_mj {result.version}" + (f", {noun} {', '.join(commits)}" if commits else "")
+    made_by = code(result.version, *(each.commit for each in results))
     lines = [
         f"{figure.name}, preset {result.preset}: {result.episodes} missions, seeds {result.seed} "
-        f"to {last}, {result.num_windows} windows each; {code}"
+        f"to {last}, {result.num_windows} windows each; {made_by}"
     ]
     if decisions := budgets(results):
         least, most = f"{decisions[0]:,}", f"{decisions[-1]:,}"

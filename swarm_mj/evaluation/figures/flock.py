@@ -1,15 +1,12 @@
 """Fig. 2: a flock at its start and at its end, by the velocities of its robots."""
 
 import numpy as np
-from jaxtyping import Float
 from matplotlib.axes import Axes
-from matplotlib.cm import ScalarMappable
-from matplotlib.colors import Normalize
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
-from matplotlib.ticker import MultipleLocator
+from matplotlib.quiver import Quiver
 
-from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, styled, write_caption
+from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, styled, write_caption
 from swarm_mj.evaluation.results import CARRIES_MORE
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.physics.state import RobotStates
@@ -20,103 +17,52 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.packages import commit, version
 
 ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
-MARGIN_M = 150.0  # around the robots, for their arrows
-KM = 1000.0
-
-
-def fly_flock(mission: Mission, policy_name: str, seed: int) -> tuple[RobotStates, RobotStates]:
-    """Return the team before and after a mission; raise ValueError for no policy or no seed."""
-    policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
-    start = swarm.states
-    for _ in rollout(swarm, policy):
-        pass
-    return start, swarm.states
-
-
-def disagreement_mps(team: RobotStates) -> Float[np.ndarray, "N"]:
-    """Return the distance of each robot's velocity from the team's mean."""
-    velocity_mps = team.velocity_mps[0]
-    return np.linalg.norm(velocity_mps - np.mean(velocity_mps, axis=0), axis=1)
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     """Fly the preset's flock and draw its start and end, an arrow per robot (Fig. 2).
 
-    The colour is the distance of a robot's velocity from the team's mean. Raises ValueError as
-    `fly_flock` does.
+    The colour is the distance of a robot's velocity from the team's mean. Raises ValueError for no
+    policy or no seed.
     """
     mission = PAPERS[preset]("flocking")
-    start, end = fly_flock(mission, policy_name, seed)
-    moments = {0.0: start, mission.num_windows * mission.window_s: end}
+    policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
+    start = swarm.states
+    for _ in rollout(swarm, policy):
+        pass
+    carries = "" if policy.payload == "none" else f" ({CARRIES_MORE})"
+    flown = f"{mission.num_robots} robots, policy {policy_name}{carries}, seed {seed}"
+    about = f"fig2, preset {preset}: {flown}, {mission.num_windows} windows"
     with styled():
-        drawing = Figure(figsize=(WIDTH_IN, 4.2))
-        *panels, bar = drawing.subplots(1, 3, width_ratios=[1.0, 1.0, 0.04])
-        drawing.subplots_adjust(left=0.08, right=0.925, top=0.8, bottom=0.18, wspace=0.12)
-        largest_mps = float(np.max(disagreement_mps(start)))
-        colours = ScalarMappable(Normalize(0.0, largest_mps), "viridis")
-        for axes, (time_s, team) in zip(panels, moments.items(), strict=True):
-            _draw(axes, mission, time_s, team, colours)
-            _frame(axes, np.concatenate([start.position_m[0], end.position_m[0]]))
-        panels[0].set_ylabel("y [km]")
-        panels[1].tick_params(labelleft=False)
-        drawing.colorbar(colours, cax=bar, label="distance from the team's mean velocity [m/s]")
+        drawing = Figure(figsize=(WIDTH_IN, 4.2), layout="constrained")
+        panels = drawing.subplots(1, 2, sharex=True, sharey=True)
+        first = _draw(panels[0], mission, 0.0, start)
+        last = _draw(panels[1], mission, mission.num_windows * mission.window_s, swarm.states)
+        first.set_clim(0.0)
+        last.set_norm(first.norm)
+        panels[0].set_ylabel("y [m]")
+        drawing.colorbar(first, ax=panels, label="distance from the team's mean velocity [m/s]")
         title = "A flock at its start and its end"
-        drawing.text(0.08, 0.93, title, fontsize=12, fontweight="bold")
-        write_caption(drawing, 0.08, 0.03, _caption(mission, policy_name, seed))
+        drawing.suptitle(title, x=0.01, ha="left", fontsize=12, fontweight="bold")
+        write_caption(drawing, f"{about}; {code(version(), commit())}")
     return drawing
 
 
-def _draw(
-    axes: Axes, mission: Mission, time_s: float, team: RobotStates, colours: ScalarMappable
-) -> None:
+def _draw(axes: Axes, mission: Mission, time_s: float, team: RobotStates) -> Quiver:
     """Draw one moment; each panel has its own scale of arrows, shown by its key."""
-    fastest_mps = float(np.max(np.linalg.norm(team.velocity_mps[0], axis=1)))
-    corner, side = -mission.half_side_m / KM, mission.side_m / KM
-    area = Rectangle((corner, corner), side, side, fill=False, color=FAINT, linewidth=0.6)
-    area.set_linestyle((0, (4, 4)))
+    corner_m, side_m = -mission.half_side_m, mission.side_m
+    area = Rectangle((corner_m, corner_m), side_m, side_m, fill=False, color=FAINT, linestyle=":")
     axes.add_patch(area)
-    x, y = team.position_m[0].T / KM
-    velocity_x, velocity_y = team.velocity_mps[0].T
-    colour = colours.to_rgba(disagreement_mps(team))
-    axes.scatter(x, y, s=9.0, color=colour, zorder=3)
-    arrows = axes.quiver(
-        x,
-        y,
-        velocity_x,
-        velocity_y,
-        color=colour,
-        scale=fastest_mps / ARROW_SHARE,
-        scale_units="width",
-        width=0.006,
-        zorder=2,
-    )
+    (x_m, y_m), velocity_mps = team.position_m[0].T, team.velocity_mps[0]
+    apart_mps = np.linalg.norm(velocity_mps - np.mean(velocity_mps, axis=0), axis=1)
+    axes.scatter(x_m, y_m, s=9.0, color=FAINT)
+    fastest_mps = np.max(np.linalg.norm(velocity_mps, axis=1))
+    arrows = axes.quiver(x_m, y_m, *velocity_mps.T, apart_mps, scale=fastest_mps / ARROW_SHARE)
     key_mps = float(f"{fastest_mps:.1g}")
     axes.quiverkey(arrows, 0.8, 1.11, key_mps, f"{key_mps:g} m/s", labelpos="E", color=FAINT)
-    variance = _power(float(velocity_variance(team.velocity_mps)[0]))
-    axes.set_title(f"after {time_s:g} s\nvelocity variance {variance} m²/s²")
-    axes.set_xlabel("x [km]")
-
-
-def _power(value: float) -> str:
-    """Return a number with two digits, and its power of ten as it is written by hand."""
-    digits, _, exponent = f"{value:.2g}".partition("e")
-    return rf"{digits}$\times$10$^{{{int(exponent)}}}$" if exponent else digits
-
-
-def _frame(axes: Axes, position_m: Float[np.ndarray, "P 2"]) -> None:
-    low = (np.min(position_m, axis=0) - MARGIN_M) / KM
-    high = (np.max(position_m, axis=0) + MARGIN_M) / KM
-    centre, half = (low + high) / 2.0, float(np.max(high - low)) / 2.0
-    axes.set_xlim(centre[0] - half, centre[0] + half)
-    axes.set_ylim(centre[1] - half, centre[1] + half)
+    variance_m2ps2 = velocity_variance(team.velocity_mps)[0]
+    axes.set_title(f"after {time_s:g} s\nvelocity variance {variance_m2ps2:.2g} m²/s²")
+    axes.set_xlabel("x [m]")
     axes.set_aspect("equal")
-    for axis in (axes.xaxis, axes.yaxis):
-        axis.set_major_locator(MultipleLocator(0.5))
-        axis.set_major_formatter("{x:g}")
-
-
-def _caption(mission: Mission, policy_name: str, seed: int) -> str:
-    code = f"swarm_mj {version()}" + (f", commit {commit()}" if commit() else "")
-    carries = "" if make_policy(policy_name, mission).payload == "none" else f" ({CARRIES_MORE})"
-    flown = f"{mission.num_robots} robots, policy {policy_name}{carries}, seed {seed}"
-    return f"fig2, preset {mission.preset}: {flown}, {mission.num_windows} windows; {code}"
+    axes.margins(0.15)  # for arrows
+    return arrows

@@ -27,6 +27,7 @@ METADATA = {
     "pdf": ("Subject", {"CreationDate": None}),
 }
 BETTER = "GNN trained in the better of two ways"  # of the published ones, at each team size
+SHORT = 7  # of a commit's digits
 CAPTION = "caption"  # the name of the text that files also have among their own descriptions
 
 
@@ -86,9 +87,17 @@ def styled() -> AbstractContextManager[None]:
     return matplotlib.style.context(["default", "swarm_mj.evaluation.figures.paper"])
 
 
-def write_caption(figure: Figure, x: float, y: float, text: str) -> None:
-    """Write the origin of a figure's numbers, in small type."""
-    figure.text(x, y, escape_mathtext(text), fontsize=7, color=FAINT, gid=CAPTION)
+def write_caption(figure: Figure, text: str, x: float = 0.01, y: float | None = None) -> None:
+    """Write the origin of a figure's numbers, in small type; a layout finds room for it."""
+    look = {"fontsize": 7, "color": FAINT, "ha": "left"}
+    figure.supxlabel(escape_mathtext(text), x=x, y=y, gid=CAPTION, **look)
+
+
+def code(version: str, *commits: str | None) -> str:
+    """Return what made a figure's numbers, for its caption."""
+    known = dict.fromkeys(each[:SHORT] for each in commits if each)
+    noun = ", commits" if len(known) > 1 else ", commit" if known else ""
+    return f"swarm_mj {version}{noun} {', '.join(known)}".rstrip()
 
 
 def save(figure: Figure, path: Path) -> None:
