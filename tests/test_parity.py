@@ -26,9 +26,9 @@ TASKS = {
 }
 AUTHORS_GRID = {0.04, 0.06, 0.08, 0.1, 0.12, 0.15}
 PUBLISHED = [
-    pytest.param(point, id=f"{point.figure}-{point.policy}-{point.x:g}-{point.cost}")
+    pytest.param(point, id=f"{point.figure}-{point.method}-{point.x:g}-{point.cost}")
     for point in points()
-    if point.policy
+    if point.method in BASELINES
 ]
 
 
@@ -40,7 +40,7 @@ def ours(point):
     (found,) = [
         result
         for result in OURS
-        if (result.policy, result.task) == (point.policy, TASKS[point.figure])
+        if (result.policy, result.task) == (point.method, TASKS[point.figure])
         and getattr(result, x_name) == x
     ]
     return found

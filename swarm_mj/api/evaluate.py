@@ -190,12 +190,10 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
         )
         for batch in batches
     )
-    torch = needs.OF_TORCH if any(map(is_learned, study.policies)) else 0.0
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     under_way = min(num_jobs, len(batches)) * largest
     return Needs(
         memory=under_way + AGE_COUNT * ages + RESULT * study.num_missions,
-        addresses=needs.ADDRESSES + torch,
         file=AGE_COUNT_IN_FILE * ages + RESULT_IN_FILE * study.num_missions,
     )
 

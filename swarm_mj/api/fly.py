@@ -150,12 +150,10 @@ def mission_of(
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     """Return the memory and disk that a flight takes."""
     memory = needs.missions_memory(mission.num_robots, 1, is_learned=registry.is_learned(policy))
-    addresses = needs.ADDRESSES + (needs.OF_TORCH if registry.is_learned(policy) else 0.0)
     if not is_recorded:
-        return Needs(memory=memory, addresses=addresses)
+        return Needs(memory=memory)
     return Needs(
         memory=memory + IN_MEMORY.of(mission, mission.num_windows),
-        addresses=addresses + needs.OF_RERUN,
         file=ON_DISK.of(mission, mission.num_windows),
     )
 

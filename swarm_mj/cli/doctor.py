@@ -161,16 +161,14 @@ def _compiled_code() -> Finding:
 
 def _print(found: list[Finding], *, works: bool) -> None:
     """Print a table by groups, then what to do, then whether flying works."""
-    groups = list(dict.fromkeys(each.group for each in found))
-    in_groups = sorted(found, key=lambda each: groups.index(each.group))
     table = Table(*(Column(overflow="fold") for _ in range(3)), show_header=False)
-    for group, findings in groupby(in_groups, lambda each: each.group):
+    for group, findings in groupby(found, lambda each: each.group):
         table.add_row(f"[bold]{group}[/bold]")
         for each in findings:
             table.add_row(f"  {each.name}", MARKS[each.state], each.found)
         table.add_section()
     Console(highlight=False, markup=True).print(table)
-    lacking = [f"  {each.name}: {each.mend}" for each in in_groups if each.state != "ok"]
+    lacking = [f"  {each.name}: {each.mend}" for each in found if each.state != "ok"]
     verdict = "works here." if works else "does not work here until what is BROKEN is mended."
     advice = ["What to do, if you need it:", *lacking] if lacking else []
     plain_console().print("\n".join([*advice, f"swarm_mj {verdict}"]))

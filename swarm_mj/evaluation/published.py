@@ -1,8 +1,7 @@
 """The paper's result figures (V): their missions, axes and numbers.
 
 Source of `published.csv`, mean and standard deviation over 100 missions a point: the data behind
-Figs. 3 to 6, which the paper's authors published with their code; one row per point and cost,
-methods named as in the figures.
+Figs. 3 to 6, which the paper's authors published with their code; one row per point and cost.
 
 Figs. 3 and 4 both show a stationary team at range ratio 0.25, but from different missions: in
 Fig. 3 the baselines are level lines (44.43, 45.28, 42.02), in Fig. 4 points of curves (46.76,
@@ -25,13 +24,7 @@ from swarm_mj.mission import PAPERS, Mission, Task
 from swarm_mj.policies.registry import WITHOUT_PAYLOAD, flown_name
 from swarm_mj.system.reading import read_rows
 
-METHODS = {
-    "random flooding": "random-flooding",
-    "round robin": "round-robin",
-    "minimum spanning tree": "mst",
-}
-BASELINES = tuple(METHODS.values())  # the paper's three, as `POLICIES` names them
-COSTS = {"age of information [windows]": "aoi", "velocity variance [m^2/s^2]": "velocity_variance"}
+BASELINES = ("random-flooding", "round-robin", "mst")  # the paper's three
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
 FORMATS = ("svg", "png", "pdf")
 OPTIONS = {
@@ -40,8 +33,8 @@ OPTIONS = {
     "velocity_ratio": "--velocity-ratio",
 }
 # All but sotdma, which is slow, and csma, which is younger than these results. The planners and gnn
-# are drawn under `paper` only: gnn was trained
-# there, and they take several times as long as all others together.
+# are drawn under `paper` only: gnn was trained there, and they take several times as long as all
+# others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     *("random-flooding", "round-robin", "mst", "aloha", "gossip", "spatial-tdma"),
@@ -56,7 +49,7 @@ class Point:
     """One point of one of the paper's curves."""
 
     figure: str  # fig3_receptive_field, fig4_transmit_power, fig5_team_size or fig6_flocking
-    method: str  # as the figure names it
+    method: str  # one of `BASELINES`, or a learned one as the figure names it
     x_name: str  # receptive_field, range_ratio, num_robots or velocity_ratio
     x: float
     cost: str  # aoi [windows] or velocity_variance [m²/s²]
@@ -69,18 +62,12 @@ class Point:
         """The mean's standard error."""
         return self.std / math.sqrt(self.episodes)
 
-    @property
-    def policy(self) -> str | None:
-        """The method's name among `POLICIES`; None for the learned ones."""
-        return METHODS.get(self.method)
-
 
 @cache
 def points() -> tuple[Point, ...]:
     """Return all points of all curves, in the order of the file."""
     _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", 1_000_000)
-    named = [row | {"cost": COSTS[row["cost"]]} for _, row in rows]
-    return msgspec.convert(named, tuple[Point, ...], strict=False)
+    return msgspec.convert([row for _, row in rows], tuple[Point, ...], strict=False)
 
 
 class Panel(NamedTuple):
@@ -196,16 +183,16 @@ SWEEPS = {figure.task: figure for figure in _ALL if figure.sweeps_missions}
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """Return what the paper reports for one of `POLICIES` in a regime, by cost, if it does.
+    """Return what the paper reports for a policy in a regime, by cost, if it does.
 
     It does only where the regime is its preset's in all that the figure does not sweep.
     """
-    if mission.task not in SWEEPS or mission.preset not in PAPERS:
+    if policy not in BASELINES or mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}
     sweep = SWEEPS[mission.task]
     free = {name: getattr(mission, name) for name in (sweep.x_name, *sweep.irrelevant)}
     if mission != PAPERS[mission.preset](mission.task, **free):
         return {}
     x = getattr(mission, sweep.x_name)
-    found = (p for p in points() if p.figure == sweep.published and p.policy == policy)
+    found = (p for p in points() if p.figure == sweep.published and p.method == policy)
     return {point.cost: point for point in found if point.x == x}

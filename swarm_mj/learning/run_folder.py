@@ -157,16 +157,12 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - needs.LIBRARIES - needs.TORCH) + passes
     file = WINDOW_BYTES * training.missions * size * first.num_windows + CHECKPOINT_BYTES
-    addresses = needs.ADDRESSES + needs.OF_TORCH
     if limits.replay_every is None:
-        return needs.Needs(memory=memory, addresses=addresses, file=file)
-    replay = ON_DISK.of(first, first.num_windows)
+        return needs.Needs(memory=memory, file=file)
     num_replays = 1 + (limits.decisions or 0) // limits.replay_every
     return needs.Needs(
         memory=memory + IN_MEMORY.of(first, first.num_windows),
-        addresses=addresses + needs.OF_RERUN,
-        file=file + num_replays * replay,
-        largest_file=max(file, replay),
+        file=file + num_replays * ON_DISK.of(first, first.num_windows),
     )
 
 

@@ -16,11 +16,9 @@ from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
 
-TREE = (
-    600.0,
-    400.0,
-)  # width and height of the tree's view, and of the matrix, in units of their own
-STATES = (1400.0, 1000.0)  # of the states, likewise
+# Width and height of views, in units of their own.
+TREE = (600.0, 400.0)  # and of the matrix
+STATES = (1400.0, 1000.0)
 OLDEST = 255  # shade of an age in the matrix, from 0
 NUM_NAMES, NUM_TICKS = 20, 6  # of robots and windows, about, beside the states
 BESIDE = 0.02  # of the states' width and height: from them to the names

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_mj.system.needs import ADDRESSES, LIBRARIES, OF_RERUN, Needs
+from swarm_mj.system.needs import LIBRARIES, Needs
 from swarm_mj.system.processes import PYTHON, running
 
 if TYPE_CHECKING:  # what draws is slow to import
@@ -134,6 +134,5 @@ def video_needs(width: int, height: int, num_pictures: int | float, suffix: str)
     kept = num_pictures if suffix == GIF else 0.0
     return Needs(
         memory=DRAWING_BYTES + (PIXEL_BYTES + KEPT_PIXEL_BYTES * kept) * pixels,
-        addresses=ADDRESSES + OF_RERUN,
         file=FILE_BYTES + FILE_PIXEL_BYTES * num_pictures * pixels,
     )

@@ -32,10 +32,8 @@ TORCH = 0.4 * GB  # with the code that trains
 PAIR = 100.0  # the tables of robots, costs and the radio
 LEARNED_PAIR = 450.0  # these, and the network's input
 HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
-# Address space that is reserved and never filled.
-ADDRESSES = 0.5 * GB  # by Python's libraries
-OF_TORCH = 0.7 * GB
-OF_RERUN = 3.0 * GB
+# Address space that libraries reserve and never fill; most of it is rerun's, a sixth torch's.
+ADDRESSES = 4.2 * GB
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -43,9 +41,7 @@ class Needs:
     """The memory and disk that a command takes beyond its process's start [bytes]."""
 
     memory: float
-    addresses: float = ADDRESSES  # of these, beyond the memory
     file: float = 0.0  # all that it writes
-    largest_file: float | None = None  # the largest file of these; None is all in one
 
 
 def check_fits(
@@ -56,16 +52,15 @@ def check_fits(
     The message says what lacks and how much, what to choose instead (the way out), and how to start
     all the same (the way on).
     """
-    asked = needs.memory + needs.addresses
+    asked = needs.memory + ADDRESSES
     has = [
         ("of memory", needs.memory, free_memory(), "are free"),
         ("of address space", asked, free_addresses(), "are left by ulimit -v"),
     ]
     if output is not None:
-        largest = needs.file if needs.largest_file is None else needs.largest_file
         has += [
             ("on disk", needs.file, free_room(output), f"fit at {output}"),
-            ("in one file", largest, largest_file(), "are allowed by ulimit -f"),
+            ("in files", needs.file, largest_file(), "are allowed in one by ulimit -f"),
         ]
     for what, needed, free, where in has:
         if needed > free and not is_forced:

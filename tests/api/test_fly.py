@@ -188,4 +188,3 @@ def test_a_long_flight_of_many_takes_what_nobody_has():
     assert (bare.memory < 0.3e9, bare.file) == (True, 0.0)
     # torch, and the packets that a learned policy's robots remember
     assert learned.memory - bare.memory > 4 * 1000**3
-    assert learned.addresses > bare.addresses

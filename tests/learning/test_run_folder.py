@@ -156,4 +156,3 @@ def test_replays_of_a_training_are_counted():
     each = ON_DISK.of(training.mission, training.mission.num_windows)
     assert ten.file - none.file == pytest.approx(11 * each)
     assert ten.memory > none.memory
-    assert ten.addresses > none.addresses

@@ -57,7 +57,7 @@ def test_the_commands_cover_every_published_regime(calls, settings):
         for regime in study.regimes
         for point in published("mst", regime).values()
     ]
-    wanted = [p for p in points() if p.policy == "mst" and p.figure != "fig3_receptive_field"]
+    wanted = [p for p in points() if p.method == "mst" and p.figure != "fig3_receptive_field"]
     assert len(found) == 2 * len(wanted)
     assert set(found) == {(preset, point) for preset in settings.presets for point in wanted}
     assert {arguments[arguments.index("--jobs") + 1] for arguments in calls.seen} == {"3"}

@@ -85,7 +85,7 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
     """Return the published curves of a cost above 0, by its column, then those of the results."""
     drawn = []
     rows = [point for point in points() if (point.figure, point.cost) == (figure.published, cost)]
-    for method, its in groupby(rows, key=lambda point: point.policy or point.method):
+    for method, its in groupby(rows, key=lambda point: point.method):
         values = [(point.x, point.mean, point.sem) for point in its]
         is_level = not figure.sweeps_missions and len({value[1:] for value in values}) == 1
         drawn.append(_curve(method, values, is_published=True, is_level=is_level))
@@ -104,16 +104,8 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
 
 def budgets(results: Sequence[Result]) -> list[int]:
     """Return the team decisions of trainings, ascending; raise ValueError for what is no number."""
-    numbers = set()
-    for result in results:
-        number = config_of(result).get("decisions")
-        if number is not None and not (type(number) is int and 0 < number <= MAX_DECISIONS):
-            raise ValueError(
-                f"decisions of {result.policy} must be a number from 1 to {MAX_DECISIONS}, not "
-                f"{number!r:.60}"
-            )
-        numbers.add(number)
-    return sorted(numbers - {None})
+    numbers = (_count(result, "decisions", 1, MAX_DECISIONS) for result in results)
+    return sorted({number for number in numbers if number is not None})
 
 
 def _curve(method: str, rows: Iterable[tuple[float, float, float]], **traits: bool) -> Curve:
@@ -136,13 +128,17 @@ def _x(figure: ResultFigure, result: Result) -> float | None:
     """Return a result's place on the axis; None for a policy without a receptive field."""
     if figure.sweeps_missions:
         return float(getattr(result, figure.x_name))
-    x = config_of(result).get(figure.x_name)
-    if x is not None and not (isinstance(x, int | float) and 0 <= x <= MAX_HOPS):
-        raise ValueError(
-            f"{figure.x_name} of {result.policy} must be a number from 0 to {MAX_HOPS}, not "
-            f"{x!r:.60}"
-        )
+    x = _count(result, figure.x_name, 0, MAX_HOPS)
     return None if x is None else float(x)
+
+
+def _count(result: Result, name: str, low: int, high: int) -> int | None:
+    """Return a whole number of a result's config, if it has one; raise ValueError for another."""
+    number = config_of(result).get(name)
+    if number is not None and not (type(number) is int and low <= number <= high):
+        rule = f"{name} of {result.policy} must be a number from {low} to {high}"
+        raise ValueError(f"{rule}, not {number!r:.60}")
+    return number
 
 
 def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> None:
