@@ -68,4 +68,4 @@ def test_all_results_of_a_preset_are_of_one_commit_and_as_many_missions(results)
 
 @pytest.mark.parametrize("preset", PRESETS)
 def test_the_flock_is_flown_by_clean_code(preset):
-    assert re.search(r"commit [0-9a-f]{12}$", written(preset, FLOCK, "svg")), REMAKE
+    assert re.search(r"commit [0-9a-f]{7}$", written(preset, FLOCK, "svg")), REMAKE

@@ -94,8 +94,8 @@ def write_caption(figure: Figure, text: str, x: float = 0.01, y: float | None = 
 
 
 def code(version: str, *commits: str | None) -> str:
-    """Return what made a figure's numbers, for its caption."""
-    known = dict.fromkeys(each[:SHORT] for each in commits if each)
+    """Return what made a figure's numbers, for its caption; `+` is a commit that was changed."""
+    known = dict.fromkeys(each[:SHORT] + "+" * each.endswith("+") for each in commits if each)
     noun = ", commits" if len(known) > 1 else ", commit" if known else ""
     return f"swarm_mj {version}{noun} {', '.join(known)}".rstrip()
 

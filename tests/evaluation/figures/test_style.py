@@ -13,7 +13,7 @@ from synthetic import everything
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.drawing import draw
-from swarm_mj.evaluation.figures.style import LOOKS, save, styled
+from swarm_mj.evaluation.figures.style import LOOKS, code, save, styled
 from swarm_mj.evaluation.published import DRAWN, FORMATS, RESULT_FIGURES
 from swarm_mj.policies.registry import POLICIES
 
@@ -61,6 +61,12 @@ def test_files_are_whole_and_say_what_their_caption_says(tmp_path):
     with Image.open(png) as picture:
         assert picture.size[0] == 1800
         assert picture.text["Description"] == caption
+
+
+def test_captions_name_each_commit_once_and_those_that_were_changed():
+    assert code("1.2", None) == "swarm_mj 1.2"
+    assert code("1.2", "0123456789ab", "0123456789ab") == "swarm_mj 1.2, commit 0123456"
+    assert code("1.2", "0123456789ab", "ba9+") == "swarm_mj 1.2, commits 0123456, ba9+"
 
 
 @pytest.mark.parametrize("kind", FORMATS)
