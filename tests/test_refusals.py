@@ -139,7 +139,7 @@ OF_ANOTHER_KIND = {
     "Mission(num_robot=3)": "unexpected keyword argument 'num_robot'; did you mean num_robots?",
     "paper(robots=3)": "Mission got an unexpected keyword argument 'robots'; ",
     "reference('flok')": "'flok'; did you mean flocking?",
-    "paper(num_robots='20')": "number of robots must be a whole number from 2 to 1000 [robots], "
+    "paper(num_robots='20')": "number of robots must be a whole number from 2 to 10000 [robots], "
     "not '20'",
     "Swarm(mission, seeds=1)": "seeds must be a list, one per mission, such as [1], not 1",
     "Swarm(mission, '12')": "seeds must be a list",

@@ -5,6 +5,7 @@ decode, and observe nothing, while they stand or move as before. No robot knows 
 """
 
 from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -22,14 +23,23 @@ Test = Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]]
 
 
 @compiled()
-def is_connected(position_m: Float[np.ndarray, "N 2"], range_m: float) -> bool:
-    """Return whether the disk graph is connected.
+def largest_part(position_m: Float[np.ndarray, "N 2"], range_m: float) -> Bool[np.ndarray, "N"]:
+    """Return who is in the largest connected part of the disk graph.
 
-    Equivalent to a positive algebraic connectivity (Fiedler 1973), which the paper tests (IV-B).
+    That is everyone if its algebraic connectivity (Fiedler 1973), which the paper tests (IV-B), is
+    positive.
     """
-    num_robots = len(position_m)
+    num_robots, num_most = len(position_m), 0
     is_met, members = np.zeros(num_robots, dtype=np.bool_), np.empty(num_robots, dtype=np.int64)
-    return gather_connected(position_m, range_m, 0, is_met, members) == num_robots
+    part = np.zeros(num_robots, dtype=np.bool_)
+    for first in range(num_robots):
+        if not is_met[first]:
+            num_members = gather_connected(position_m, range_m, first, is_met, members)
+            if num_members > num_most:
+                num_most = num_members
+                part[:] = False
+                part[members[:num_members]] = True
+    return part
 
 
 def connected_positions(
@@ -48,18 +58,16 @@ def connected_positions(
     `largest_part_at` says who is in the largest connected part under the team's own channel. Robots
     that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest`, and where
     the largest part is known, only robots outside it are drawn anew, not the whole team: between
-    obstacles hardly any team is connected that is drawn at once. Raises ValueError if all draws
-    were disconnected, or the area has hardly any free space.
+    obstacles, or of thousands, hardly any team is connected that is drawn at once. Raises
+    ValueError if all draws were disconnected, or the area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
     position_m, is_kept = np.empty((num_robots, 2)), np.zeros(num_robots, dtype=np.bool_)
+    find = largest_part_at or partial(largest_part, range_m=range_m)
     for _ in range(num_draws):
         _draw_free(position_m, is_kept, half_side_m, rng, is_blocked_at)
-        if largest_part_at is None:
-            is_whole = is_connected(position_m, range_m)
-        else:
-            part = largest_part_at(position_m)
-            is_whole, is_kept = bool(np.all(part)), part & keeps_largest
+        part = find(position_m)
+        is_whole, is_kept = bool(np.all(part)), part & keeps_largest
         if is_whole:
             return position_m
     reach = f"a range of {range_m:g} m"

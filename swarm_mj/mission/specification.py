@@ -94,7 +94,7 @@ class Mission:
         "paper", "preset", "IV-B", Preset, "the paper's text or code, or an arena with its channel"
     )
     task: Task = _choice("flocking", "task", "IV", Task, "what the robots do")
-    num_robots: int = _number(40, "number of robots", "robots", 2.0, 1000.0, "size of the team")
+    num_robots: int = _number(40, "number of robots", "robots", 2.0, 10_000.0, "size of the team")
     density_per_km2: float = _number(40.0, "density", "robots/km²", 0.1, 10_000.0)
     range_ratio: float = _number(
         0.25, "range ratio", "of 1 km", 0.01, 10.0, "range of a packet in silence"

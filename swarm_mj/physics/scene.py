@@ -1,7 +1,9 @@
 """The scene: the arena and N robots, composed from the MJCF files in `assets/`."""
 
+import copy
 import math
 from collections.abc import Callable
+from xml.etree import ElementTree
 
 import numpy as np
 from mujoco._enums import mjtDisableBit
@@ -18,6 +20,7 @@ CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window o
 ROBOT_MASS_KG = 1.0  # assets/robot.xml
 WALL_HALF_THICKNESS_M = 2.0  # assets/arena.xml
 WALL_HALF_HEIGHT_M = 5.0  # assets/arena.xml
+NAMES = {"name", "joint"}  # attributes that hold a robot's own names, assets/robot.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
 ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
@@ -66,15 +69,11 @@ def compose(
     robots in it; its geoms stop robots in `contact` physics only, as `exact` has no collisions.
     Raises ValueError if the scene added, took away or renamed joints or actuators.
     """
-    spec = MjSpec.from_file(str(asset("arena.xml")))
+    spec = _arena_with_robots(mission.num_robots)
     spec.option.timestep = timestep_s(mission)
     spec.modelname = f"swarm of {mission.num_robots}"
     _scale_arena(spec, mission)
-    robot = MjSpec.from_file(str(asset("robot.xml")))
-    _fit_robot(robot, mission)
-    for i in range(mission.num_robots):
-        frame = spec.worldbody.add_frame(pos=[0.0, 0.0, ROBOT_HEIGHT_M])
-        spec.attach(robot.copy(), frame=frame, prefix=f"r{i}/")
+    _fit_robots(spec, mission)
     if mission.collide:
         spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for change in (arena_of(mission), scene):
@@ -83,6 +82,23 @@ def compose(
     if start is not None:
         _place_robots(spec, mission, start)
     return spec
+
+
+def _arena_with_robots(num_robots: int) -> MjSpec:
+    """Read the arena and as many robots as one text: `attach` takes minutes for thousands."""
+    arena, robot = (
+        ElementTree.parse(asset(f"{name}.xml")).getroot() for name in ("arena", "robot")
+    )
+    ElementTree.SubElement(arena, "actuator")
+    for part in ("worldbody", "actuator"):
+        (whole,) = arena.iter(part)
+        for i in range(num_robots):
+            added = copy.deepcopy(robot.findall(f"{part}/*"))
+            for each in (each for element in added for each in element.iter()):
+                for key in NAMES.intersection(each.keys()):
+                    each.attrib[key] = f"r{i}/{each.attrib[key]}"
+            whole.extend(added)
+    return MjSpec.from_string(ElementTree.tostring(arena, encoding="unicode"))
 
 
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
@@ -141,7 +157,7 @@ def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
     """
     position_m, velocity_mps = start.position_m[0], start.velocity_mps[0]
     for i, (x, y) in enumerate(position_m.tolist()):
-        spec.body(f"r{i}/body").pos = [x, y, 0.0]
+        spec.body(f"r{i}/body").pos = [x, y, ROBOT_HEIGHT_M]
         spec.joint(f"r{i}/x").ref, spec.joint(f"r{i}/y").ref = x, y
     key = spec.add_key(name="start", qpos=position_m.ravel(), qvel=velocity_mps.ravel())
     if mission.physics == "exact":  # whose servos take velocities
@@ -167,14 +183,18 @@ def _scale_arena(spec: MjSpec, mission: Mission) -> None:
         wall.size = [width, depth, WALL_HALF_HEIGHT_M]
 
 
-def _fit_robot(robot: MjSpec, mission: Mission) -> None:
-    """Set the robot's beacon, the mission's bounds on it, and in `contact` its elastic walls."""
+def _fit_robots(spec: MjSpec, mission: Mission) -> None:
+    """Set robots' beacons, the mission's bounds on them, and in `contact` their elastic walls."""
     step_s = timestep_s(mission)
-    robot.option.timestep = step_s
     beacon_m = BEACON_RADIUS_M * max(1.0, mission.side_m / MISSION_DISTANCE_M)
-    robot.geom("beacon").size = [beacon_m, *robot.geom("beacon").size[1:]]
+    for i in range(mission.num_robots):
+        spec.geom(f"r{i}/beacon").size[0] = beacon_m
+        if mission.collide:
+            hull = spec.geom(f"r{i}/hull")
+            hull.contype = hull.conaffinity = ROBOTS_BIT
+            _bounce(hull, mission)
     force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2
-    for actuator in robot.actuators:
+    for actuator in spec.actuators:
         actuator.forcerange = [-force_n, force_n]
         if mission.physics == "exact":
             actuator.set_to_velocity(kv=ROBOT_MASS_KG / step_s)
@@ -182,12 +202,8 @@ def _fit_robot(robot: MjSpec, mission: Mission) -> None:
         else:
             actuator.set_to_motor()
             actuator.ctrlrange = [-force_n, force_n]
-    if mission.collide:
-        hull = robot.geom("hull")
-        hull.contype = hull.conaffinity = ROBOTS_BIT
-        _bounce(hull, mission)
     if mission.physics == "contact" and mission.has_walls:
-        for joint in robot.joints:
+        for joint in spec.joints:
             joint.limited = True
             joint.range = [-mission.half_side_m, mission.half_side_m]
             joint.solref_limit = [0.0, -2.0 / step_s]

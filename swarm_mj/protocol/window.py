@@ -207,30 +207,16 @@ def alg_1(
     Arguments are as in `transmit`. `compiled_window.talk` does the same in one compiled call.
     """
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    transmission = exchange(buffers, states, recipient, channel, now)
-    if num_slots == 1:
-        return (transmission,)
-    answered = respondents(transmission)
-    return transmission, exchange(buffers, states, answered, channel, now + SLOT_WINDOWS)
-
-
-def exchange(
-    buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-) -> Phase:
-    """Let everyone observe itself, send its packet over the channel and merge what it decodes.
-
-    Arguments are as in `transmit`; a response is no attempt (Alg. 1).
-    """
-    observe_self(buffers, states, now)
-    sent_to = of_active(states.is_active, recipient)
-    heard = checked_decode(channel_at(channel, now), states.position_m, sent_to)
-    heard = of_active(states.is_active, heard)
-    merge(buffers, heard, entries_sent(buffers, sent_to))
-    return Phase(recipient=sent_to.copy(), heard=heard)
+    phases = []
+    for slot in range(num_slots):
+        t = now + slot * SLOT_WINDOWS
+        observe_self(buffers, states, t)
+        sent_to = of_active(states.is_active, respondents(phases[0]) if slot else recipient)
+        heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
+        heard = of_active(states.is_active, heard)
+        merge(buffers, heard, entries_sent(buffers, sent_to))
+        phases.append(Phase(recipient=sent_to.copy(), heard=heard))
+    return tuple(phases)
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:

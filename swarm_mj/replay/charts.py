@@ -13,7 +13,7 @@ from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import by_kind, is_other
 from swarm_mj.replay.palette import Colour
-from swarm_mj.replay.recorder import Log
+from swarm_mj.replay.recorder import Log, in_matrix
 from swarm_mj.replay.rerun_log import RerunLog
 
 # Width and height of views, in units of their own.
@@ -87,7 +87,8 @@ def draw_age_matrix(out: RerunLog) -> None:
     """
     log, full_scale = out.log, out.log.facts.full_scale
     parent = spanning_tree(log.position_m[:1])[0].tolist()
-    order = walk(parent, range(len(parent)), ROOT)[0][1:]
+    place = {robot: n for n, robot in enumerate(in_matrix(len(parent)))}
+    order = [place[i] for i in walk(parent, range(len(parent)), ROOT)[0][1:] if i in place]
     shares = np.minimum(log.age[:, order][:, :, order] / full_scale, 1.0)
     shades = np.rint(OLDEST * shares).astype(np.uint8)
     ages = np.linspace(0.0, full_scale, OLDEST + 1)

@@ -12,7 +12,7 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.charts import STATES, TREE, PlotCurve, plots
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import PIECES, WHOLE, by_kind
-from swarm_mj.replay.recorder import Log
+from swarm_mj.replay.recorder import Log, in_matrix
 from swarm_mj.replay.rerun_log import LAYERS, TIMELINE, RerunLog
 from swarm_mj.replay.stage import square_m
 
@@ -60,7 +60,9 @@ def layout(log: Log, ground: Ground) -> Layout:
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
     across, up = ((-0.05 * size, 1.05 * size) for size in TREE)
     tree = _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up)
-    ages = "Ages: rows about columns"
+    every = in_matrix(log.facts.mission.num_robots).step
+    of_some = f", every {every}th robot" if every > 1 else ""
+    ages = f"Ages: rows about columns{of_some}"
     matrix = _drawing("/", ages, (0.0, TREE[0]), (0.0, TREE[1]), contents=["/ages"])
     charts = [_plot(name, curves) for name, curves in plots(log).items()]
     mission = rrb.Horizontal(

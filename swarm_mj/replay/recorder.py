@@ -1,5 +1,6 @@
 """The record of a flight for its replay: one mission's windows as plain arrays."""
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from numbers import Integral
@@ -10,18 +11,25 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
-from swarm_mj.protocol.buffers import NO_PARENT
+from swarm_mj.protocol.buffers import NEVER, NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
 from swarm_mj.replay.footage import Facts, Footage, frame, shown_ground
 from swarm_mj.replay.palette import nice_scale
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.compiled import compiled
 from swarm_mj.system.needs import GB
 
 # Longer or larger flights keep the age matrix of every k-th window only.
 MAX_AGE_MATRIX_BYTES = 64e6
 AGE_BYTES = 4  # float32
+MAX_MATRIX_ROBOTS = 1000  # of larger teams, the matrix has every k-th robot
+
+
+def in_matrix(num_robots: int) -> range:
+    """Return the robots that the age matrix shows of a team."""
+    return range(0, num_robots, -(-num_robots // MAX_MATRIX_ROBOTS))
 
 
 class ReplaySize(NamedTuple):
@@ -35,7 +43,8 @@ class ReplaySize(NamedTuple):
     def of(self, mission: Mission, num_windows: int) -> float:
         """Return the size of the replay of so long a flight [bytes]."""
         num_robots = mission.num_robots
-        matrices = min(MAX_AGE_MATRIX_BYTES, AGE_BYTES * num_windows * num_robots**2)
+        matrix = AGE_BYTES * len(in_matrix(num_robots)) ** 2
+        matrices = min(MAX_AGE_MATRIX_BYTES, num_windows * matrix)
         a_window = self.window + self.robot * num_robots
         return self.base + a_window * num_windows + self.matrix * matrices
 
@@ -59,7 +68,7 @@ class Log(Footage):
     parent: Int[np.ndarray, "T N"]  # P^{ego,j}
     ego_age: Float[np.ndarray, "T N"]  # t - T^{ego,j}, also of those never heard of [windows]
     age_window: Int[np.ndarray, "K"]  # the windows of the age matrix, every stride-th
-    age: Float[np.ndarray, "K N N"]  # t - T^{i,j} [windows]
+    age: Float[np.ndarray, "K M M"]  # t - T^{i,j} of the robots `in_matrix` [windows]
     age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
@@ -98,7 +107,8 @@ class Recorder:
         """Prepare the record of what the ego robot knows; raise ValueError if there is none."""
         num_robots = swarm.mission.num_robots
         check_observer(ego, num_robots)
-        matrices_bytes = AGE_BYTES * num_robots**2 * swarm.mission.num_windows
+        self._in_matrix = np.array(in_matrix(num_robots))
+        matrices_bytes = AGE_BYTES * len(self._in_matrix) ** 2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._radio_stride = links.stride_of(swarm, self._stride)
         self._swarm, self._ego, self._index = swarm, ego, index
@@ -111,12 +121,14 @@ class Recorder:
         """Record the window that was just flown, if any, with its costs, if they are known."""
         swarm, index, own = self._swarm, self._index, self._ego
         buffers, states, phases = swarm.buffers, swarm.states, swarm.phases
-        age = swarm.now[index] - buffers.timestamp[index]
-        robots = np.arange(len(age))
-        is_on = np.ones(len(age), bool) if states.is_active is None else states.is_active[index]
-        others = age[is_on[:, None] & is_on & (robots[:, None] != robots)]
+        now, timestamp = swarm.now[index], buffers.timestamp[index]
+        robots = np.arange(len(timestamp))
+        is_on = np.ones(len(robots), bool) if states.is_active is None else states.is_active[index]
+        age_std, age_max = _age_spread(timestamp, now, is_on)
         if len(self._rows) % self._stride == 0:
-            self._age.append(age.astype(np.float32))
+            some = timestamp[np.ix_(self._in_matrix, self._in_matrix)]
+            self._age.append((now - some).astype(np.float32))
+        ego_age, is_granted = now - timestamp[own], buffers.is_granted[index]
         is_due = len(self._rows) % self._radio_stride == 0
         if is_due and (snapshot := links.radio_snapshot(swarm, index)) is not None:
             self._snapshots.append(snapshot)
@@ -134,12 +146,12 @@ class Recorder:
             "heard": [phase.heard[index] for phase in phases] or silence,
             "is_on": is_on,
             "believed_m": buffers.position_m[index, own],
-            "ego_age": age[own],
-            "known_age": np.where(buffers.is_known[index, own], age[own], np.nan),
+            "ego_age": ego_age,
+            "known_age": np.where((timestamp[own] > NEVER) | is_granted, ego_age, np.nan),
             "parent": buffers.parent[index, own],
             "age_mean": age_mean,
-            "age_std": np.std(others),
-            "age_max": np.max(others),
+            "age_std": age_std,
+            "age_max": age_max,
             "velocity_variance_m2ps2": velocity_variance,
         }
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix. The
@@ -186,7 +198,7 @@ class Recorder:
             **self._compared(columns["is_on"]),
         )
 
-    def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K N N"]) -> Facts:
+    def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K M M"]) -> Facts:
         return Facts(
             mission=self._swarm.mission,
             policy=config.get("policy") or "",
@@ -240,3 +252,26 @@ def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
     ground = frame(seen.position_m, half_side_m)
     ground = replace(ground, reach_m=max(half_side_m, ground.reach_m))
     return replace(seen, facts=facts, ground=ground)
+
+
+@compiled()
+def _age_spread(
+    timestamp: Float[np.ndarray, "N N"], now: float, is_on: Bool[np.ndarray, "N"]
+) -> tuple[float, float]:
+    """Return the standard deviation and the worst of ages between robots that are on [windows].
+
+    In loops: of thousands of robots, an array of all pairs takes a gigabyte.
+    """
+    num_pairs, total, oldest = 0, 0.0, -np.inf
+    for i in np.flatnonzero(is_on):
+        for j in range(len(is_on)):
+            if is_on[j] and j != i:
+                num_pairs += 1
+                total += now - timestamp[i, j]
+                oldest = max(oldest, now - timestamp[i, j])
+    mean, squares = total / num_pairs, 0.0
+    for i in np.flatnonzero(is_on):
+        for j in range(len(is_on)):
+            if is_on[j] and j != i:
+                squares += (now - timestamp[i, j] - mean) ** 2
+    return math.sqrt(squares / num_pairs), oldest

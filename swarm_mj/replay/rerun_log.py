@@ -1,5 +1,6 @@
 """A replay as rerun's recording: how each entity looks, and its rows on the mission's timelines."""
 
+import math
 from collections.abc import Iterable, Sequence
 from typing import Any, NamedTuple
 
@@ -14,6 +15,7 @@ from swarm_mj.replay.palette import PACKETS, Colour, dim
 from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
+CROWD = 400  # robots from which on they are drawn smaller, so that they do not cover each other
 
 
 class EntityStyle(NamedTuple):
@@ -83,6 +85,7 @@ class RerunLog:
 
     def __init__(self, recording: rr.RecordingStream, log: Log, ground: Ground) -> None:
         self._recording, self.log, self.ground = recording, log, ground
+        self.scale = min(1.0, math.sqrt(CROWD / log.is_on.shape[1]))  # of robots that are drawn [1]
 
     def fixed(self, path: str, *archetypes: Any) -> None:
         """Write what never changes. It would hide the same component written in time."""
@@ -114,6 +117,8 @@ class RerunLog:
     def fixed_layer(self, path: str, **fields: Any) -> None:
         """Write things of a layer that never change, by the fields of the layer's archetype."""
         layer = LAYERS[path]
+        if layer.kind is rr.Points2D and path.startswith("arena"):
+            layer = layer._replace(width=layer.width * self.scale)
         self.fixed(path, layer.kind.from_fields(**layer.style, **fields))
 
     def words(self, path: str, texts: list[str], places: Sequence[tuple[float, float]]) -> None:

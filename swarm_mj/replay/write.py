@@ -155,7 +155,8 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     log = out.log
     speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
     # All of one length, for agreement is in directions.
-    way_m = HEADING_SHARE * out.ground.reach_m * log.velocity_mps / np.maximum(speed, 1e-9)
+    length_m = HEADING_SHARE * out.ground.reach_m * out.scale
+    way_m = length_m * log.velocity_mps / np.maximum(speed, 1e-9)
     start, end = (at.reshape(-1, 2) for at in (log.position_m, log.position_m + way_m))
     out.lines("arena/heading", start, end)
     out.lines("scene/heading", lifted(start, height_m), lifted(end, height_m))

@@ -34,6 +34,7 @@ from swarm_mj.radio.obstruction import blocked
 from swarm_mj.system.fields import check_kind, name_of
 
 MAX_THREADS = 1024
+MAX_DRAWN_AT_ONCE = 1000  # robots of a team that is drawn anew as a whole until it is connected
 
 
 class Swarm:
@@ -115,7 +116,7 @@ class Swarm:
             rng=rng,
             largest_part_at=partial(composed.largest_part, mission=b) if composed else None,
             is_blocked_at=self._is_blocked if has_obstacles or mission.collide else None,
-            keeps_largest=has_obstacles,
+            keeps_largest=has_obstacles or mission.num_robots > MAX_DRAWN_AT_ONCE,
         )
 
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:

@@ -1,7 +1,7 @@
 """Memory and disk that a command needs, and what this machine has left of them.
 
-The constants are peaks measured on Linux, with all tasks and policies, of 2 to 1000 robots. A test
-compares estimates with peaks; they should be right within a factor of 2, and rather too high.
+The constants are peaks measured on Linux, with all tasks and policies. A test compares estimates
+with peaks; they should be right within a factor of 2, and rather too high.
 """
 
 import math
@@ -29,7 +29,7 @@ GB = 1e9
 LIBRARIES = 0.15 * GB  # compiling included
 TORCH = 0.4 * GB  # with the code that trains
 # Of a mission and each pair of its robots [bytes].
-PAIR = 100.0  # the tables of robots, costs and the radio
+PAIR = 60.0  # the tables of robots, costs and the radio
 LEARNED_PAIR = 450.0  # these, and the network's input
 HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
 # Address space that libraries reserve and never fill; most of it is rerun's, a sixth torch's.

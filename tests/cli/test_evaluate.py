@@ -203,7 +203,7 @@ def test_existing_results_need_force(succeed, refusal, tmp_path, output):
 
 
 REFUSED = {
-    "--robots 10 1": "a whole number from 2 to 1000 [robots], not 1",
+    "--robots 10 1": "a whole number from 2 to 10000 [robots], not 1",
     "--range-ratio 0.02 --jobs 2": "too sparse",
     "--resume": "--resume needs the --json or --csv",
     "--plot chart.jpg": "--plot must be named *.png or *.svg or *.pdf, not chart.jpg",

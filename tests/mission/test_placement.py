@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from swarm_mj.mission.placement import connected_positions, is_connected
+from swarm_mj.mission.placement import connected_positions, largest_part
 
 points = st.lists(st.tuples(st.integers(-9, 9), st.integers(-9, 9)), min_size=1, max_size=12)
 
@@ -32,7 +32,7 @@ def algebraic_connectivity(graph):
 @given(position_m=points, range_m=st.integers(1, 9))
 @settings(max_examples=200)
 def test_connected_as_the_algebraic_connectivity_says(position_m, range_m):
-    connected = is_connected(np.array(position_m, dtype=float), float(range_m))
+    connected = largest_part(np.array(position_m, dtype=float), float(range_m)).all()
     graph = disk_graph(position_m, range_m)
     assert connected == nx.is_connected(graph)
     assert connected == (algebraic_connectivity(graph) > 1e-10)
@@ -45,6 +45,28 @@ def test_positions_are_connected_and_in_the_area(num_robots, half_side_m, seed):
     assert position_m.shape == (num_robots, 2)
     assert (np.abs(position_m) <= half_side_m).all()
     assert nx.is_connected(disk_graph(position_m, 250.0))
+
+
+@given(position_m=points, range_m=st.integers(1, 9))
+@settings(max_examples=100)
+def test_the_largest_part_is_one_of_the_largest(position_m, range_m):
+    part = largest_part(np.array(position_m, dtype=float), float(range_m))
+    parts = list(nx.connected_components(disk_graph(position_m, range_m)))
+    assert set(np.flatnonzero(part).tolist()) in parts
+    assert np.sum(part) == max(map(len, parts))
+
+
+def test_of_a_large_team_only_those_apart_are_drawn_anew():
+    """Of 2000 robots as dense as the paper's, hardly any team is connected at once."""
+    half_side_m = np.sqrt(2000 / 40.0) * 500.0
+    first_m = np.random.default_rng(3).uniform(-half_side_m, half_side_m, (2000, 2))
+    assert not largest_part(first_m, 250.0).all()
+    rng = np.random.default_rng(3)
+    position_m = connected_positions(2000, half_side_m, 250.0, rng, keeps_largest=True)
+    assert largest_part(position_m, 250.0).all()
+    kept = largest_part(first_m, 250.0)
+    np.testing.assert_array_equal(position_m[kept], first_m[kept])
+    assert np.mean(kept) > 0.9
 
 
 def test_positions_fill_the_area():

@@ -113,8 +113,8 @@ def test_values_outside_their_range_are_refused(spec, value):
 @pytest.mark.parametrize(
     ("field", "value", "kind"),
     [
-        ("num_robots", 2.5, "a whole number from 2 to 1000"),
-        ("num_robots", "40", "a whole number from 2 to 1000"),
+        ("num_robots", 2.5, "a whole number from 2 to 10000"),
+        ("num_robots", "40", "a whole number from 2 to 10000"),
         ("range_ratio", "wide", "a number from 0.01 to 10"),
         ("silence_is_attempt", "no", "True or False"),
     ],

@@ -105,6 +105,20 @@ def test_large_flights_keep_every_kth_age_matrix(monkeypatch):
     np.testing.assert_array_equal(log.age, [seen[w - 1] for w in (1, 4, 7, 10)])
 
 
+def test_of_a_large_team_the_matrix_has_every_kth_robot(monkeypatch):
+    monkeypatch.setattr(recorder, "MAX_MATRIX_ROBOTS", 4)
+    swarm = Swarm(paper("random-walk", num_robots=9, num_windows=6), [0])
+    record, seen = Recorder(swarm), []
+    for window in rollout(swarm, make_policy("round-robin", swarm.mission)):
+        record.add(window)
+        seen.append(swarm.now[0] - swarm.buffers.timestamp[0])
+    log, some = record.log(), [0, 3, 6]
+    np.testing.assert_array_equal(log.age, [age[np.ix_(some, some)] for age in seen])
+    off = ~np.eye(9, dtype=bool)
+    np.testing.assert_allclose(log.age_std, [np.std(age[off]) for age in seen])
+    np.testing.assert_array_equal(log.age_max, [np.max(age[off]) for age in seen])
+
+
 def test_an_interrupt_inside_add_leaves_a_whole_log(monkeypatch):
     mission = paper("stationary", num_robots=5, num_windows=4)
     swarm = Swarm(mission, [0])
@@ -116,7 +130,7 @@ def test_an_interrupt_inside_add_leaves_a_whole_log(monkeypatch):
         raise KeyboardInterrupt
 
     second = next(windows)
-    monkeypatch.setattr(recorder.np, "std", interrupt)
+    monkeypatch.setattr(recorder.np, "array", interrupt)
     with pytest.raises(KeyboardInterrupt):
         record.add(second)
     monkeypatch.undo()

@@ -7,7 +7,7 @@ import pytest
 from channels import to_nobody
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.mission.placement import is_connected
+from swarm_mj.mission.placement import largest_part
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, DecentralisedPolicy
 from swarm_mj.policies.random_access import RandomFlooding
 from swarm_mj.policies.registry import POLICIES, make_policy
@@ -100,7 +100,7 @@ def test_iv_b_start_is_connected_inside_and_known_to_nobody_else():
     mission = small("random-walk")
     swarm = Swarm(mission, list(range(10)))
     for position_m in swarm.states.position_m:
-        assert is_connected(position_m, 250.0)
+        assert largest_part(position_m, 250.0).all()
         assert np.abs(position_m).max() <= 500.0 * (8 / 40) ** 0.5
     buffers, own = swarm.buffers, np.arange(8)
     np.testing.assert_array_equal(buffers.position_m[:, own, own], swarm.states.position_m)
