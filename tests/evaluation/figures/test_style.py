@@ -66,7 +66,7 @@ def test_files_are_whole_and_say_what_their_caption_says(tmp_path):
 def test_captions_name_each_commit_once_and_those_that_were_changed():
     assert code("1.2", None) == "swarm_mj 1.2"
     assert code("1.2", "0123456789ab", "0123456789ab") == "swarm_mj 1.2, commit 0123456"
-    assert code("1.2", "0123456789ab", "ba9+") == "swarm_mj 1.2, commits 0123456, ba9+"
+    assert code("1.2", "0123456789ab", "ba9876543210+").endswith(", commits 0123456, ba98765+")
 
 
 @pytest.mark.parametrize("kind", FORMATS)
