@@ -7,13 +7,16 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int
+from jaxtyping import Bool, Float, Int, Int32, UInt64
 
 from swarm_mj.radio.reception import Incoming, add_packet, decoded
 from swarm_mj.radio.spatial_reuse import NOISE
 from swarm_mj.system.compiled import compiled
 
 SLOTS_PER_ROOT = 3.2  # of the number of robots, chosen as the numbers of `Rule`
+Known = UInt64[np.ndarray, "F"]  # a bit for each robot of a word, in the trial of each slot
+NOWHERE = -1  # the slot of a robot that does not transmit
+WORD = 64  # robots whose news spreads together, a bit each
 
 
 class Rule(NamedTuple):
@@ -40,90 +43,138 @@ class Rule(NamedTuple):
     lost_frames: float = 12.0  # and one not heard for even longer is gone [frames]
 
 
-class Choices(NamedTuple):
-    """Choices that robots made, the earliest first."""
-
-    robot: Int[np.ndarray, "C"]
-    slot: Int[np.ndarray, "C"]  # of the mission, in which it chose
-
-
 def frame_slots(num_robots: int) -> int:
     """Return how many slots a team's frames have."""
     return max(2, min(num_robots, round(SLOTS_PER_ROOT * math.sqrt(num_robots))))
 
 
+@compiled()
+def choices_before(slot: int, num_robots: int, rule: Rule) -> int:
+    """Return how many choices come before a slot: everyone's in turn, as evenly as slots allow."""
+    # Not in the first frame, before which nobody has heard how the first slots do.
+    period = rule.frames_per_choice * rule.num_slots
+    return -(-max(slot, rule.num_slots) * num_robots // period)
+
+
 class Frame(NamedTuple):
-    """A frame as one robot believes it to be, with room to simulate it."""
+    """A frame as one robot believes it to be."""
 
     rule: Rule
     power: Float[np.ndarray, "N N"]  # of i's packets at j [noise]
-    transmits: Bool[np.ndarray, "F N"]
+    slot: Int[np.ndarray, "N"]  # in which each transmits, or `NOWHERE`
     heard: Int[np.ndarray, "F N"]  # the sender that j decodes; j itself: none
-    timestamp: Float32[np.ndarray, "N N"]  # T in the simulation [slots]
 
 
 @compiled()
 def empty_frame(power: Float[np.ndarray, "N N"], rule: Rule) -> Frame:
     """Return a frame in which nobody transmits."""
     num_robots = power.shape[0]
-    heard = np.empty((rule.num_slots, num_robots), dtype=np.int64)
-    for s in range(rule.num_slots):
-        for j in range(num_robots):
-            heard[s, j] = j
-    transmits = np.zeros(heard.shape, dtype=np.bool_)
-    return Frame(rule, power, transmits, heard, np.empty(power.shape, dtype=np.float32))
+    heard = np.zeros((rule.num_slots, 1), dtype=np.int64) + np.arange(num_robots)
+    return Frame(rule, power, np.full(num_robots, NOWHERE), heard)
 
 
 @compiled()
 def switch(frame: Frame, s: int, k: int) -> None:
     """Let k transmit in a slot, or no longer, and write what sender each decodes (Eqs. 3-4)."""
     power, heard = frame.power, frame.heard[s]
-    frame.transmits[s, k] = not frame.transmits[s, k]
+    frame.slot[k] = NOWHERE if frame.slot[k] == s else s
+    senders = np.flatnonzero(frame.slot == s)
     for j in range(power.shape[0]):
         incoming = Incoming(0.0, 0.0, j)
-        for i in range(power.shape[0]):
-            if frame.transmits[s, i] and i != j:
-                incoming = add_packet(incoming, i, power[i, j], power[i, j])
+        for i in senders:
+            incoming = add_packet(incoming, int(i), power[i, j], power[i, j])
         heard[j] = decoded(incoming, j, NOISE, frame.rule.threshold, factor=frame.rule.interference)
-        if frame.transmits[s, j]:
-            heard[j] = j
-
-
-# Maxima and sums in any order let the compiler use its vectors; whole slots add up exactly.
-@compiled(fastmath={"reassoc", "nnan", "nsz"})
-def _merge(held: Float32[np.ndarray, "N"], sent: Float32[np.ndarray, "N"]) -> None:
-    for k in range(held.shape[0]):
-        held[k] = max(held[k], sent[k])
-
-
-@compiled(fastmath={"reassoc", "nnan", "nsz"})
-def _sum(row: Float32[np.ndarray, "N"]) -> np.floating:
-    total = np.float32(0.0)
-    for k in range(row.shape[0]):
-        total += row[k]
-    return total
+    heard[senders] = senders
 
 
 @compiled()
-def mean_age(frame: Frame) -> float:
-    """Return the mean age of information in the last of the frames simulated [slots]."""
-    heard, timestamp = frame.heard, frame.timestamp
-    num_slots, num_robots = heard.shape
-    timestamp[...] = -frame.rule.start_frames * num_slots
-    now, age = np.float32(0.0), 0.0
-    for n in range(frame.rule.simulated_frames * num_slots):
-        now += np.float32(1.0)
+def _count(bits: np.uint64) -> np.int64:
+    """Return how many bits are set, by sums of neighbouring bits, pairs and nibbles."""
+    bits -= bits >> np.uint64(1) & np.uint64(0x5555555555555555)
+    pairs = np.uint64(0x3333333333333333)
+    bits = (bits & pairs) + (bits >> np.uint64(2) & pairs)
+    bits = bits + (bits >> np.uint64(4)) & np.uint64(0x0F0F0F0F0F0F0F0F)
+    return np.int64(bits * np.uint64(0x0101010101010101) >> np.uint64(56))
+
+
+@compiled()
+def _learn(mine: Known, sent: Known, tried: Known, s: int) -> bool:
+    """Add what is heard in slot s, and `tried` in the trial of s; return whether any is news."""
+    in_trial = mine[s] | tried[s]
+    news = in_trial ^ mine[s]
+    for t in range(mine.shape[0]):
+        news |= sent[t] & ~mine[t]
+        mine[t] |= sent[t]
+    mine[s] = in_trial
+    return bool(news != 0)
+
+
+@compiled()
+def _weigh(known: Known, weights: Int[np.ndarray, "W F"], weight: Int32[np.ndarray, "F"]) -> None:
+    """Fill in the weight of all robots known; a single row of weights is that of each."""
+    num_weights = weights.shape[0]
+    for t in range(weight.shape[0]):
+        weight[t] = weights[0, t] * _count(known[t]) if num_weights == 1 else 0
+    for k in range(num_weights if num_weights > 1 else 0):
+        for t in range(weight.shape[0]):
+            weight[t] += weights[k, t] * np.int64(known[t] >> np.uint64(k) & np.uint64(1))
+
+
+@compiled()
+def _spread(
+    frame: Frame,
+    tried: Int[np.ndarray, "F N"],
+    known: UInt64[np.ndarray, "N F"],
+    younger: Int[np.ndarray, "W F"],
+    total: Int32[np.ndarray, "F N F"],
+) -> None:
+    """Add to T in the last frame what robots learn of a word of others, in all trials.
+
+    Frames repeat, so the news of the first spreads as that of any other: a robot that knows it in a
+    slot knows a later frame's in the same slot of the last one. So what it knows in a slot makes T
+    a frame younger in the last frame, and in that frame itself younger than the start.
+    """
+    num_slots, num_robots = tried.shape
+    last = (frame.rule.simulated_frames - 1) * num_slots
+    weight = np.empty(known.shape, dtype=np.int32)
+    weights = np.full((1, num_slots), num_slots)
+    for n in range(last + num_slots):
+        s, weights = n % num_slots, younger if n >= last else weights
         for i in range(num_robots):
-            timestamp[i, i] = now
-        for j in range(num_robots):
-            sender = heard[n % num_slots, j]
             # In place: a robot that transmits decodes nothing, so its row is as it was sent.
-            if sender != j:
-                _merge(timestamp[j], timestamp[sender])
-        if n >= (frame.rule.simulated_frames - 1) * num_slots:
-            for i in range(num_robots):
-                age += now - _sum(timestamp[i]) / num_robots
-    return age / (num_slots * num_robots)
+            j, k = frame.heard[s, i], tried[s, i]
+            is_news = (j != i or k != i) and _learn(known[i], known[j], known[k], s)
+            if is_news or n in (0, last):
+                _weigh(known[i], weights, weight[i])
+            for t in range(num_slots):
+                total[s, i, t] += weight[i, t]
+
+
+@compiled()
+def mean_ages(
+    frame: Frame, tried: Int[np.ndarray, "F N"], slots: Int[np.ndarray, "N F"]
+) -> Float[np.ndarray, "F"]:
+    """Return the mean age in the last of the frames simulated, in the trial of each slot [slots].
+
+    Robots transmit in these `slots` of all trials, and decode whom they do in `tried` in its slot.
+    """
+    (num_slots, num_robots), rule = tried.shape, frame.rule
+    last, start = (rule.simulated_frames - 1) * num_slots, int(rule.start_frames * num_slots)
+    total = np.zeros((num_slots, num_robots, num_slots), dtype=np.int32)
+    for first in range(0, num_robots, WORD):
+        known = np.zeros(slots.shape, dtype=np.uint64)
+        for i in range(first, min(first + WORD, num_robots)):
+            for t in range(num_slots):
+                known[i, t] = np.uint64(slots[i, t] != NOWHERE) << np.uint64(i - first)
+        _spread(frame, tried, known, slots[first : first + WORD] + (1 + start), total)
+    # A robot observes itself all the time, and all others at the start.
+    rest = (slots == NOWHERE) * (last + start) - slots - num_robots * start
+    ages = np.zeros(num_slots)
+    for s in range(num_slots):
+        for i in range(num_robots):
+            for t in range(num_slots):
+                ages[t] += last + s + 1 - (total[s, i, t] + rest[i, t] + s) / num_robots
+    return ages / (num_slots * num_robots)
 
 
 @compiled()
@@ -135,25 +186,18 @@ def best_slot(
     The frame is that of all others, and remains so. The robot keeps its own slot unless another is
     better by the least gain [slots]. A marked robot does not decode k in that slot.
     """
-    num_slots, num_robots = frame.heard.shape
-    before = np.empty(num_robots, dtype=np.int64)
-    best, least = own, np.inf
-    for s in range(num_slots):
-        for j in range(num_robots):
-            before[j] = frame.heard[s, j]
+    tried, slots = np.empty_like(frame.heard), np.empty(frame.heard.shape[::-1], dtype=np.int64)
+    for s in range(tried.shape[0]):
         switch(frame, s, k)
-        for j in range(num_robots):
-            if frame.heard[s, j] == k and is_marked[s, j]:
-                frame.heard[s, j] = j
-        # A move makes teammates' beliefs wrong until they hear of it, so small gains do not count.
-        age = mean_age(frame) - (min_gain if s == own else 0.0)
-        if age < least:
-            best, least = s, age
-        # Restored rather than received anew, which would cost as much as the trial.
-        frame.transmits[s, k] = False
-        for j in range(num_robots):
-            frame.heard[s, j] = before[j]
-    return best
+        slots[:, s] = frame.slot
+        for j in range(tried.shape[1]):
+            is_deaf = frame.heard[s, j] == k and is_marked[s, j]
+            tried[s, j] = j if is_deaf else frame.heard[s, j]
+        switch(frame, s, k)
+    ages = mean_ages(frame, tried, slots)
+    # A move makes teammates' beliefs wrong until they hear of it, so small gains do not count.
+    ages[own] -= min_gain
+    return int(np.argmin(ages))
 
 
 @compiled()
@@ -169,7 +213,7 @@ def first_slots(
     """
     frame = empty_frame(power, rule)
     slots = np.zeros(order.shape[0], dtype=np.int64)
-    no_marks = np.zeros(frame.transmits.shape, dtype=np.bool_)
+    no_marks = np.zeros(frame.heard.shape, dtype=np.bool_)
     for place in range(order.shape[0]):
         k = order[place]
         slots[k] = place % rule.num_slots
@@ -187,24 +231,27 @@ def chosen(
     announced: Int[np.ndarray, "N"],
     is_known: Bool[np.ndarray, "N"],
     is_marked: Bool[np.ndarray, "F N"],
-    chose: Choices,
+    order: Int[np.ndarray, "N"],
+    slot: int,
     power: Float[np.ndarray, "N N"],
     rule: Rule,
 ) -> int:
     """Return the slot of the frame that robot i chooses, who believes the others in these slots.
 
-    Robots that chose lately (in which slot of the mission, the earliest first) and did not announce
-    a slot since may have moved: i first predicts their choices.
+    Robots that chose lately, before this slot of the mission, and did not announce one since may
+    have moved: i first predicts their choices.
     """
-    slots = slots.copy()
+    num_robots, slots = slots.shape[0], slots.copy()
     frame = empty_frame(power, rule)
-    for k in range(slots.shape[0]):
+    for k in range(num_robots):
         if is_known[k] or k == i:
             switch(frame, slots[k], k)
     no_marks = np.zeros(is_marked.shape, dtype=np.bool_)
-    for n in range(len(chose.robot)):
-        k = int(chose.robot[n])
-        if k != i and is_known[k] and announced[k] < chose.slot[n]:
+    lately = choices_before(slot - rule.predicted_slots, num_robots, rule)
+    for n in range(lately, choices_before(slot, num_robots, rule)):
+        k = int(order[n % num_robots])
+        chose = n * rule.frames_per_choice * rule.num_slots // num_robots
+        if k != i and is_known[k] and announced[k] < chose:
             # Marks are private, so a prediction has to do without those of k.
             switch(frame, slots[k], k)
             slots[k] = best_slot(frame, k, slots[k], rule.min_gain, no_marks)

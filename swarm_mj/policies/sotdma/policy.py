@@ -22,14 +22,15 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.sotdma import slot_table
-from swarm_mj.policies.sotdma.frame import Choices, Rule, chosen, first_slots, frame_slots
+from swarm_mj.policies.sotdma.frame import Rule, choices_before, chosen, first_slots, frame_slots
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
-from swarm_mj.radio.power_law import powers_between, write_powers
+from swarm_mj.radio.power_law import PowerLaw, powers_between, write_powers
+from swarm_mj.system.compiled import compiled
 
 
 class SelfOrganisedTdma(BroadcastPolicy):
@@ -97,13 +98,13 @@ class SotdmaTeam:
 
         Before the first frame these are the robots in turn; `draw` is on [0, 1), for contention.
         """
-        rule, slot = self._rule, round(view.now / SLOT_WINDOWS)
+        rule, order, slot = self._rule, self._order, round(view.now / SLOT_WINDOWS)
         if self._first_slot is None:
-            self._first_slot = slot + rule.first_rounds * len(self._order)
+            self._first_slot = slot + rule.first_rounds * len(order)
         slot -= self._first_slot
         if slot < 0:
             return in_turn
-        is_known = view.is_known | np.eye(len(self._order), dtype=bool)
+        is_known = view.is_known | np.eye(len(order), dtype=bool)
         if self.table is None:
             slots = self._first_slots(view.position_m, is_known)
             self.table = slot_table.empty_table(slots, rule.num_slots)
@@ -113,20 +114,15 @@ class SotdmaTeam:
         if self._reads_packets:
             slot_table.read_packets(table, view.heard, known, view.parent, slot - 1, rule)
         slot_table.read_slots(table, known, rule)
-        for i in self._choosers(slot):
-            table.slots[i, i] = chosen(
-                i,
-                table.slots[i],
-                table.announced[i],
-                is_known[i],
-                slot_table.marks(table, i, slot, rule),
-                self._chose_lately(slot),
-                self._powers(view.position_m[i], is_known[i]),
-                rule,
-            )
+        first, after = (choices_before(slot + n, len(order), rule) for n in (0, 1))
+        for i in order[np.arange(first, after) % len(order)].tolist():
+            slots, announced = table.slots[i], table.announced[i]
+            is_marked = slot_table.marks(table, i, slot, rule)
+            power = self._powers(view.position_m[i], is_known[i])
+            slots[i] = chosen(i, slots, announced, is_known[i], is_marked, order, slot, power, rule)
         place = place_of(slot, rule)
         if place == NO_PLACE:
-            is_near = is_known & self._is_in_range(view.position_m)
+            is_near = is_known & _is_in_range(view.position_m, self._law, rule.threshold)
             needs = slot_table.are_in_need(table, known, is_near, slot, rule)
             transmits = needs & (draw < rule.contention_probability)
         else:
@@ -148,33 +144,20 @@ class SotdmaTeam:
             slots[i] = done[believed]
         return slots
 
-    def _choosers(self, slot: int) -> list[int]:
-        """Return who chooses anew in this slot: everyone once in some frames, in common order."""
-        if slot < self._rule.num_slots:  # nobody has heard how the first slots do
-            return []
-        period = self._rule.frames_per_choice * self._rule.num_slots
-        # Everyone's turn comes as evenly as whole slots allow.
-        first, after = (-(-(slot % period + n) * len(self._order) // period) for n in (0, 1))
-        return self._order[first:after].tolist()
-
-    def _chose_lately(self, slot: int) -> Choices:
-        """Return who chose in which slot, the earliest first."""
-        lately = range(slot - self._rule.predicted_slots, slot)
-        choosers = [self._choosers(before) for before in lately]
-        return Choices(
-            robot=np.array([k for each in choosers for k in each], dtype=np.int64),
-            slot=np.repeat(np.array(lately, dtype=np.int64), [len(each) for each in choosers]),
-        )
-
-    def _is_in_range(self, position_m: Float[np.ndarray, "N N 2"]) -> Bool[np.ndarray, "N N"]:
-        """Return who decodes each robot's lone packets, as it believes."""
-        power = np.empty(position_m.shape[:2])
-        for i in range(len(power)):
-            write_powers(i, position_m[i], self._law, power[i])
-        return power >= self._rule.threshold
-
     def _powers(
         self, position_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"]
     ) -> Float[np.ndarray, "N N"]:
         """Return powers between robots that one robot knows, as it believes [noise]."""
         return powers_between(position_m, self._law) * is_known[:, None] * is_known[None, :]
+
+
+@compiled()
+def _is_in_range(
+    position_m: Float[np.ndarray, "N N 2"], law: PowerLaw, threshold: float
+) -> Bool[np.ndarray, "N N"]:
+    """Return who decodes each robot's lone packets, as it believes; powers are over the noise."""
+    num_robots = position_m.shape[0]
+    power = np.empty((num_robots, num_robots))
+    for i in range(num_robots):
+        write_powers(i, position_m[i], law, power[i])
+    return power >= threshold

@@ -8,13 +8,14 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.sotdma.frame import (
-    Choices,
+    NOWHERE,
     Rule,
     best_slot,
+    choices_before,
     chosen,
     empty_frame,
     first_slots,
-    mean_age,
+    mean_ages,
     switch,
 )
 from swarm_mj.radio.mission_radio import radio_of
@@ -22,7 +23,6 @@ from swarm_mj.radio.power_law import PowerLaw, powers_between
 
 RADIO = radio_of(paper("stationary"))
 NUM_ROBOTS, NUM_SLOTS, FRAMES = 9, 5, 3
-NOWHERE = -1  # no slot of the frame
 RULE = Rule(RADIO.threshold, NUM_SLOTS, simulated_frames=FRAMES, start_frames=2.0, interference=1.2)
 
 
@@ -44,7 +44,8 @@ def frame_of(power, slots, interference=1.0):
 
 def aged(heard):
     """Mean age in the last frame [slots]: every robot is told, one after the other."""
-    known = np.full((NUM_ROBOTS, NUM_ROBOTS), -10.0)
+    num_robots = heard.shape[1]
+    known = np.full((num_robots, num_robots), -10.0)
     ages = []
     for now in range(1, FRAMES * NUM_SLOTS + 1):
         np.fill_diagonal(known, now)
@@ -76,11 +77,29 @@ def test_more_interference_than_believed_can_only_silence():
     assert np.sum(is_heard) < np.sum(plain.heard != np.arange(NUM_ROBOTS))
 
 
-@pytest.mark.parametrize("seed", range(4))
-def test_eq10_the_mean_age_is_that_of_robots_told_one_by_one(seed):
-    _, power = team(seed)
-    frame = frame_of(power, np.random.default_rng(seed).integers(0, NUM_SLOTS, NUM_ROBOTS))
-    assert mean_age(frame) == pytest.approx(aged(frame.heard), rel=1e-5)
+@pytest.mark.parametrize(
+    ("seed", "num_robots"), [(0, 9), (1, 9), (2, 9), (3, 64), (4, 65), (5, 130)]
+)
+def test_eq10_the_mean_ages_are_those_of_robots_told_one_by_one(seed, num_robots):
+    """A robot is tried in each slot, in teams of a word of robots and of more; some are silent."""
+    rng, everyone = np.random.default_rng(seed), np.arange(num_robots)
+    own = rng.integers(NOWHERE, NUM_SLOTS, num_robots)
+    own[0] = NOWHERE
+    slots = np.tile(own[:, None], NUM_SLOTS)
+    slots[0] = np.arange(NUM_SLOTS)
+    heard = np.tile(everyone, (NUM_SLOTS, 1))
+    for s in range(NUM_SLOTS):
+        senders, hears = np.flatnonzero(own == s), (rng.random(num_robots) < 0.5) & (own != s)
+        if len(senders) > 0:
+            heard[s, hears] = rng.choice(senders, np.sum(hears))
+    hears_it = (rng.random(heard.shape) < 0.3) & (own != np.arange(NUM_SLOTS)[:, None])
+    tried = np.where(hears_it | (everyone == 0), 0, heard)
+    frame = empty_frame(np.zeros((num_robots, num_robots)), RULE)._replace(heard=heard)
+    ages = mean_ages(frame, tried, slots)
+    for s in range(NUM_SLOTS):
+        trial = heard.copy()
+        trial[s] = tried[s]
+        assert ages[s] == pytest.approx(aged(trial), rel=1e-12)
 
 
 @pytest.mark.parametrize("seed", range(6))
@@ -91,7 +110,7 @@ def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
     slots = rng.integers(0, NUM_SLOTS, NUM_ROBOTS)
     slots[4] = NOWHERE
     frame = frame_of(power, slots)
-    before = frame.heard.copy(), frame.transmits.copy()
+    before = frame.heard.copy(), frame.slot.copy()
     is_marked = rng.random((NUM_SLOTS, NUM_ROBOTS)) < 0.6
     ages = []
     for s in range(NUM_SLOTS):
@@ -105,12 +124,11 @@ def test_the_best_slot_is_the_youngest_of_all_that_were_tried(seed):
         assert ages[chosen] == pytest.approx(min(ages), rel=1e-5)
     assert best_slot(frame, 4, worst, 1.5 * apart, is_marked) == worst
     np.testing.assert_array_equal(frame.heard, before[0])
-    np.testing.assert_array_equal(frame.transmits, before[1])
+    np.testing.assert_array_equal(frame.slot, before[1])
 
 
 EVERYONE = np.ones(NUM_ROBOTS, dtype=bool)
 NO_MARKS = np.zeros((NUM_SLOTS, NUM_ROBOTS), dtype=bool)
-NO_CHOICES = Choices(robot=np.zeros(0, dtype=np.int64), slot=np.zeros(0, dtype=np.int64))
 
 
 def best(power, slots, k, own, min_gain=RULE.min_gain, is_marked=NO_MARKS):
@@ -135,17 +153,25 @@ def test_the_first_of_the_order_have_a_slot_each_and_the_others_choose_in_turn(u
         assert slots[k] == expected
 
 
+def test_everyone_chooses_once_in_four_frames_but_not_in_the_first():
+    """Nine robots in 20 slots of four frames of five: the nth chooses in slot 20 n / 9."""
+    before = [choices_before(slot, 9, RULE) for slot in range(46)]
+    expected = [sum(20 * n // 9 == slot for n in range(30)) for slot in range(45)]
+    assert np.diff(before).tolist() == [0] * 5 + expected[5:]
+    assert before[40] - before[20] == 9
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_a_robot_takes_the_best_slot_beside_where_it_believes_the_others(seed):
-    """Choices not heard of are predicted first, in their order, without marks: robots 5 and 1 chose
-    in slots 50 and 52; 6 too, but was heard since; 3 is oneself."""
+    """Choices not heard of are predicted first, in their order, without marks. In slots 51, 53, 55
+    and 57 of the nine before chose robots 5, 1, 6, and 3, oneself; 6 was heard since."""
     power, rng = team(seed)[1], np.random.default_rng(seed)
     slots, is_marked = rng.integers(0, NUM_SLOTS, NUM_ROBOTS), rng.random(NO_MARKS.shape) < 0.3
-    announced = np.array([0, 51, 0, 0, 0, 49, 54, 0, 0])
-    four = Choices(robot=np.array([5, 1, 6, 3]), slot=np.array([50, 52, 53, 53]))
-    for chose in (NO_CHOICES, four):
-        expected = slots.copy()
-        for k in chose.robot[:2]:
+    announced = np.array([0, 52, 0, 0, 0, 49, 56, 0, 0])
+    order = np.array([0, 2, 4, 7, 8, 5, 1, 6, 3])
+    for num_predicted, predicted in ((0, []), (9, [5, 1])):
+        expected, rule = slots.copy(), RULE._replace(predicted_slots=num_predicted)
+        for k in predicted:
             expected[k] = best(power, expected, k, expected[k])
-        choice = chosen(3, slots, announced, EVERYONE, is_marked, chose, power, RULE)
+        choice = chosen(3, slots, announced, EVERYONE, is_marked, order, 60, power, rule)
         assert choice == best(power, expected, 3, slots[3], is_marked=is_marked)

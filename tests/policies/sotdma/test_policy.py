@@ -9,6 +9,7 @@ from standing_teams import view_of
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.sotdma import policy as sotdma_policy
 from swarm_mj.policies.sotdma.frame import frame_slots
 from swarm_mj.policies.sotdma.policy import SotdmaTeam
 from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, place_of
@@ -153,16 +154,17 @@ def test_frames_grow_with_the_root_of_the_team_and_are_never_longer_than_a_round
     assert [frame_slots(n) for n in (2, 5, 10, 20, 40, 80)] == [2, 5, 10, 14, 20, 29]
 
 
-def test_everyone_chooses_once_in_four_frames_but_not_in_the_first():
-    team = begun(row())
+def test_robots_choose_in_common_order_from_the_second_frame_on(monkeypatch):
+    """Twelve robots choose once each in the 44 slots of four frames of 11."""
+    team, chose = begun(row()), []
     assert team._rule.num_slots == 11
-    assert [team._choosers(slot) for slot in range(11)] == [[]] * 11
-    choosers = [i for slot in range(44, 88) for i in team._choosers(slot)]
-    assert choosers == ORDER.tolist()
-    lately = team._chose_lately(88)
-    assert lately.robot.tolist()[-12:] == ORDER.tolist()
-    assert np.all((np.diff(lately.slot) >= 0) & (lately.slot[1:] < 88))
-    assert lately.slot[0] >= 88 - 48
+    monkeypatch.setattr(
+        sotdma_policy, "chosen", lambda i, slots, *_: chose.append((n, i)) or slots[i]
+    )
+    for n in range(1, 88):
+        asked(team, row(), FIRST + n)
+    assert [i for n, i in chose if n >= 44] == ORDER.tolist()
+    assert min(chose)[0] >= 11
 
 
 def test_robots_that_believe_the_same_work_out_the_same_first_slots():
