@@ -156,7 +156,7 @@ def _outcome(work: Callable[[], int], was_interrupted: Callable[[], bool]) -> tu
             return work(), ""
     except SystemExit as end:  # of help, or of a line that cannot be read
         return int(end.code or DONE), ""
-    except (ValueError, OSError, ImportError, MemoryError) as error:
+    except (ValueError, OSError, ImportError, MemoryError, SystemError) as error:
         if was_interrupted() and not isinstance(error, MemoryError):
             return INTERRUPTED, "interrupted"  # which a library made into another exception
         is_input = isinstance(error, (ValueError, *WRONG_NAMES))

@@ -114,8 +114,8 @@ class Mission:
     noise_dbm: float = _number(
         -50.0, "noise power", "dBm", -200.0, 50.0, "transmit power follows it", group=CHANNEL
     )
-    sensing_dbm: float = _radio(  # files of development versions lack it
-        -57.0, "sensing threshold", "dBm", -200.0, 50.0, "power that csma senses", may_lack=True
+    sensing_dbm: float | None = _radio(  # files of development versions lack it
+        None, "sensing threshold", "dBm", -200.0, 50.0, "power that csma senses", may_lack=True
     )
     frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
     failure_fraction: float = _number(

@@ -18,6 +18,15 @@ from swarm_mj.radio.mission_radio import TrueLinks
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
 
+SENSED_BELOW_DB = 8.0  # what just decodes: two and a half times the range, in free space
+
+
+def sensed_dbm(mission: Mission) -> float:
+    """Return the power from which a robot's channel is busy, the mission's own or the usual."""
+    if mission.sensing_dbm is not None:
+        return mission.sensing_dbm
+    return mission.noise_dbm + mission.sinr_threshold_db - SENSED_BELOW_DB
+
 
 class CarrierSense(RandomTransmission, CentralisedPolicy):
     """Robots broadcast unless they sense another's packet.

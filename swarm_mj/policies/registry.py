@@ -11,7 +11,7 @@ from typing import Any
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, make
-from swarm_mj.policies.carrier_sense import CarrierSense
+from swarm_mj.policies.carrier_sense import CarrierSense, sensed_dbm
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.planner.link_tables import link_fields
@@ -50,7 +50,7 @@ RULES: dict[str, Callable[..., Policy]] = {
         root_transmits=mission.tree_root_transmits,
     ),
     "aloha": lambda mission, probability: Aloha(probability, range_m=mission.range_m),
-    "csma": lambda mission, probability: CarrierSense(probability, mission.sensing_dbm),
+    "csma": lambda mission, probability: CarrierSense(probability, sensed_dbm(mission)),
     "gossip": lambda _, probability: InnovationGossip(probability),
     "tdma": lambda _: Tdma(),
     "spatial-tdma": SpatialTdma,

@@ -52,7 +52,7 @@ class ReplaySize(NamedTuple):
 # Of measured peaks, when a replay is written, and of files of teams that move; others' are smaller.
 # The age matrices are copied in memory and compressed in the file.
 IN_MEMORY = ReplaySize(base=0.1 * GB, window=15e3, robot=1e3, matrix=2.2)
-ON_DISK = ReplaySize(base=0.5e6, window=500.0, robot=150.0, matrix=0.25)
+ON_DISK = ReplaySize(base=0.5e6, window=800.0, robot=110.0, matrix=0.04)
 
 
 @dataclass(frozen=True, kw_only=True)

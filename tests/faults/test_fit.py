@@ -66,7 +66,7 @@ def small_machine(monkeypatch):
     [
         (("fly", *LONG), "102 GB of memory, and 4 GB are free; choose fewer --robots or --windows"),
         (("fly", "--robots", "100", "--windows", "100000"), "GB of memory, and 4 GB are free"),
-        (("fly", "--windows", "100000", "--robots", "10"), "0.21 GB on disk, and 0.1 GB fit at"),
+        (("fly", "--windows", "100000", "--robots", "10"), "0.192 GB on disk, and 0.1 GB fit at"),
         (("fly", "--policy", "gnn", "--robots", "1000", "--no-record"), "are free"),
         (("evaluate", "--jobs", "256", "--robots", "1000"), "choose fewer --jobs, --robots,"),
         (("evaluate", "--episodes", "100000", "--windows", "100000", "--policy", "tdma"), "free"),

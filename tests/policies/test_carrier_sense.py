@@ -9,7 +9,7 @@ from hypothesis import strategies as st
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.carrier_sense import CarrierSense, beginners
+from swarm_mj.policies.carrier_sense import CarrierSense, beginners, sensed_dbm
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
 from swarm_mj.protocol.window import LocalViews
@@ -17,7 +17,17 @@ from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("stationary")
-SENSED_MW = 10 ** (MISSION.sensing_dbm / 10)
+SENSED_MW = 10**-5.7
+
+
+@pytest.mark.parametrize(("noise_dbm", "expected"), [(-50.0, -57.0), (-94.0, -101.0)])
+def test_robots_sense_two_and_a_half_times_as_far_as_they_decode(noise_dbm, expected):
+    mission = paper("stationary", noise_dbm=noise_dbm)
+    assert sensed_dbm(mission) == expected
+    radio = radio_of(mission)
+    sensed_m = np.sqrt(radio.received_at_1_m_mw / 10 ** (expected / 10))
+    assert sensed_m == pytest.approx(2.5 * mission.range_m, rel=0.01)
+    assert sensed_dbm(paper("stationary", sensing_dbm=-60.0)) == -60.0
 
 
 def begun(minislot, power_mw, sensed_mw=1.0, is_active=None):
@@ -72,7 +82,7 @@ def test_who_transmits_is_who_heard_too_little_before(seed, num_robots):
 
 
 def started(probability, num_robots, num_missions=1):
-    policy = CarrierSense(probability, MISSION.sensing_dbm)
+    policy = CarrierSense(probability, -57.0)
     policy.inform(TrueLinks(radio=radio_of(MISSION)))
     policy.start(num_robots, [np.random.default_rng((3, b)) for b in range(num_missions)])
     return policy

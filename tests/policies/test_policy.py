@@ -90,7 +90,7 @@ def test_a_payload_counts_and_where_it_does_not_fit_the_policy_does_not_fly():
     fits = paper(bit_rate=1016 * 160.0)
     assert Heavy().packet(fits).num_entries == 1
     Swarm(fits, [1]).start(Heavy())
-    with pytest.raises(ValueError, match="packets of Heavy need 1016 bytes for a single entry"):
+    with pytest.raises(ValueError, match="packets of Heavy need 1,016 bytes for a single entry"):
         Swarm(paper(bit_rate=1015 * 160.0), [1]).start(Heavy())
 
 
