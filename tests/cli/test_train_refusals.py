@@ -18,7 +18,7 @@ REFUSED = {
     "NEW --robots 10 201": "robots must be a whole number from 2 to 200, not 201",
     "NEW --robots many": "argument --robots: invalid int value: 'many'",
     "NEW --range-ratio 0.02": "too sparse",
-    "NEW --robots 10 --bit-rate 10k": "94 bytes, but a slot holds 62 bytes; choose a higher",
+    "NEW --robots 10 --bit-rate 10k": "94 bytes, but a slot holds 62 bytes at 10 kbit/s; choose",
     "NEW --missions 16 --robots 4 5 6": "a multiple of the 3 team sizes, such as 15, 18, not 16",
     "NEW --credit team --preset reference --missions 1": "is too small for 4",
     "NEW --missions 4096 --robots 200": "GB of memory, and",
