@@ -186,26 +186,14 @@ def _slots(
     num_slots: int,
     silence_is_attempt: bool,
 ) -> tuple[Phase, ...]:
-    """Play a slot, and the responses in a second: compiled where all of it is the package's own."""
+    """Play a slot of transmissions, and a second of responses if there are two, over any channel.
+
+    Arguments are as in `transmit`. `compiled_window.talk` does the same in one call, where radio
+    and packets are the paper's.
+    """
     if type(channel) is FreeSpaceRadio and not isinstance(buffers, PartialBuffers):
         said = talk(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
         return tuple([Phase(said[s, 0], said[s, 1]) for s in range(num_slots)])
-    return alg_1(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
-
-
-def alg_1(
-    buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    num_slots: int,
-    silence_is_attempt: bool,
-) -> tuple[Phase, ...]:
-    """Play a slot of transmissions, and a second of responses if there are two, over any channel.
-
-    Arguments are as in `transmit`. `compiled_window.talk` does the same in one compiled call.
-    """
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
     phases = []
     for slot in range(num_slots):
