@@ -10,10 +10,10 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.protocol.window import DoubleBroadcast, LocalViews
+from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import TrueLinks
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
@@ -39,18 +39,12 @@ class CarrierSense(RandomTransmission, CentralisedPolicy):
 
     is_centralised = False
     uses = "the power that it senses in the channel before it transmits"
+    window = BroadcastPolicy.window
 
     def __init__(self, probability: float, sensing_dbm: float) -> None:
         """Take the probability in each minislot, and the power from which a channel is busy."""
         super().__init__(probability)
         self._sensed_mw = from_db(sensing_dbm)
-
-    def window(self, mission: Mission) -> DoubleBroadcast:
-        """Return two broadcasts."""
-        return DoubleBroadcast(
-            silence_is_attempt=mission.silence_is_attempt,
-            needs_addressees=mission.half_duplex == "eavesdroppers",
-        )
 
     def inform(self, truth: TrueLinks) -> None:
         """Take the true channel, whose mean powers robots sense."""
@@ -58,7 +52,9 @@ class CarrierSense(RandomTransmission, CentralisedPolicy):
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return `BROADCAST` for each robot that finds its channel idle."""
-        minislot = self._minislots()
+        # A geometric number; p = 0 waits forever, and p = 1 not at all.
+        with np.errstate(divide="ignore"):
+            minislot = np.floor(np.log1p(-self._stream.next()) / np.log1p(-self._probability))
         everyone = np.ones(minislot.shape, dtype=np.bool_)
         is_active = everyone if states.is_active is None else states.is_active
         recipient = views.silence.copy()
@@ -67,11 +63,6 @@ class CarrierSense(RandomTransmission, CentralisedPolicy):
             begins = beginners(minislot[b], is_active[b], power_mw, self._sensed_mw)
             recipient[b, begins] = BROADCAST
         return recipient
-
-    def _minislots(self) -> Float[np.ndarray, "B N"]:
-        """Draw when each robot begins if nothing stops it: a geometric number of minislots."""
-        with np.errstate(divide="ignore"):  # p = 0 waits forever, and p = 1 not at all
-            return np.floor(np.log1p(-self._stream.next()) / np.log1p(-self._probability))
 
 
 @compiled()

@@ -10,8 +10,6 @@ order: `i` sends, `j` receives. Times are in slots, float32, which keeps them ex
 windows.
 """
 
-from typing import NamedTuple
-
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
@@ -24,15 +22,6 @@ from swarm_mj.radio.links import Links, air_of, listen
 from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.radio.reception import NOBODY
 from swarm_mj.system.compiled import compiled
-
-
-class _Requests(NamedTuple):
-    """The expected outcome of a window's first slot, in which one more robot sends."""
-
-    heard: Int[np.ndarray, "N"]  # whom each robot may decode; itself: nobody
-    probability: Float[np.ndarray, "N"]  # that it does
-    after: Float32[np.ndarray, "N N"]  # T when responses are sent [slots]
-    gain: float  # the rise of T so far, summed [slots]
 
 
 class GreedyOracle(CentralisedPolicy):
@@ -132,8 +121,7 @@ def window_gains(
                 gain += probability[j] * gains[heard[j], j]
             merge_expected(sent, heard, probability, after)
             observe_own(after, now + SLOTS_PER_WINDOW)
-            requests = _Requests(heard, probability, after, gain)
-            _add_responses(links, i, recipient, is_free, requests, value[i])
+            _add_responses(links, i, recipient, is_free, heard, probability, after, gain, value[i])
     return value
 
 
@@ -143,12 +131,18 @@ def _add_responses(
     i: int,
     recipient: Int[np.ndarray, "N"],
     is_free: Bool[np.ndarray, "N"],
-    requests: _Requests,
+    heard: Int[np.ndarray, "N"],
+    probability: Float[np.ndarray, "N"],
+    after: Float32[np.ndarray, "N N"],
+    gain: float,
     value: Float[np.ndarray, "N"],
 ) -> None:
-    """Fill `value[r]`: the gain of the first slot and of the responses if r is i's recipient."""
+    """Fill `value[r]`: the gain of the first slot and of the responses if r is i's recipient.
+
+    In the first slot, robots decode whom they may have heard with these probabilities. T after it,
+    when responses are sent, and the gain so far, summed over T, are in slots.
+    """
     num_robots = recipient.shape[0]
-    heard, probability, after, gain = requests
     answers = np.zeros(num_robots, dtype=np.bool_)  # who may decode a packet addressed to it
     for j in range(num_robots):
         answers[j] = heard[j] != j and recipient[heard[j]] == j

@@ -43,7 +43,7 @@ def checked_decode(
     """
     if is_ours(channel):
         return channel(position_m, recipient.copy())  # in the one layout it is compiled for
-    heard = np.asarray(channel(position_m.copy(), recipient.copy()))
+    heard = np.array(channel(position_m.copy(), recipient.copy()))
     name = name_of(channel)
     check_robots(f"channel {name}: sender heard", heard, recipient.shape)
     identity = np.arange(recipient.shape[1])

@@ -35,16 +35,6 @@ class Packets(NamedTuple):
 PACKET_COUNTS = Packets._fields
 
 
-class PhaseCounts(NamedTuple):
-    """The packets of one phase [packets]; names as in `Packets`."""
-
-    sent: Float[np.ndarray, "B"]
-    delivered: Float[np.ndarray, "B"]
-    overheard: Float[np.ndarray, "B"]
-    heard: Float[np.ndarray, "B"]
-    receptions: Float[np.ndarray, "B"]
-
-
 def age_of_information(
     buffers: Buffers,
     now: Float[np.ndarray, "B"],
@@ -109,38 +99,36 @@ class WindowCosts(NamedTuple):
     age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
     is_complete: Bool[np.ndarray, "B"]  # whether all robots know all others
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
-    counts: Float[np.ndarray, "2 C B"]  # of packets in each phase, in the order of `PhaseCounts`
+    # Packets of both phases: sent, delivered, overheard, heard, and receptions, as in `Packets`.
+    counts: Float[np.ndarray, "2 5 B"]
     is_broadcast: bool  # whether both phases are broadcasts (IV-C), or the second answers (Alg. 1)
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
 
     @property
     def packets(self) -> Packets:
         """The fates of the packets."""
-        first, second = PhaseCounts(*self.counts[0]), PhaseCounts(*self.counts[1])
-        transmitted = first.sent + second.sent
+        first, second = self.counts
+        transmitted, _, overheard, heard, receptions = first + second
         if self.is_broadcast:
-            counts = {
-                "sent": transmitted,
-                "heard": first.heard + second.heard,
-                "receptions": first.receptions + second.receptions,
-            }
+            counts = {"sent": transmitted, "heard": heard, "receptions": receptions}
         else:
+            sent, delivered = first[:2]
             counts = {
-                "sent": first.sent,
-                "attempted": first.sent,
-                "delivered": first.delivered,
-                "lost": first.sent - first.delivered,
-                "overheard": first.overheard + second.overheard,
-                "answered": second.delivered,
+                "sent": sent,
+                "attempted": sent,
+                "delivered": delivered,
+                "lost": sent - delivered,
+                "overheard": overheard,
+                "answered": second[1],
             }
-        none = dict.fromkeys(PACKET_COUNTS, np.full_like(transmitted, np.nan))
+        none = dict.fromkeys(PACKET_COUNTS, np.full(len(transmitted), np.nan))
         return Packets(**none | counts | {"transmitted": transmitted})
 
 
 def window_costs(
     buffers: Buffers,
     states: RobotStates,
-    phases: tuple[Phase, Phase],
+    phases: tuple[Phase, ...],
     now: Float[np.ndarray, "B"],
     *,
     is_broadcast: bool,
@@ -149,7 +137,7 @@ def window_costs(
     """Return all costs of one window for the active robots; arguments as above."""
     first, second = phases
     age, is_complete = np.empty(len(now)), buffers.is_granted.copy()
-    variance, counts = np.empty(len(now)), np.empty((2, len(PhaseCounts._fields), len(now)))
+    variance, counts = np.empty(len(now)), np.zeros((2, 5, len(now)))
     _measure(
         buffers.timestamp,
         now,
@@ -201,11 +189,13 @@ def _measure(
     age: Float[np.ndarray, "B"],
     is_complete: Bool[np.ndarray, "B"],
     variance: Float[np.ndarray, "B"],
-    counts: Float[np.ndarray, "2 C B"],
+    counts: Float[np.ndarray, "2 C B"],  # of zeros
 ) -> None:
     """Fill in all costs, in one call: of a single mission, calls cost more than what they do."""
     _mean_age(timestamp, now, is_active, age, is_complete)
-    variance[:] = velocity_variance(velocity_mps, is_active)
+    by_mission = velocity_variance(velocity_mps, is_active)
+    for b in range(variance.shape[0]):
+        variance[b] = by_mission[b]
     _count(recipient, heard, counts[0])
     _count(recipient_2, heard_2, counts[1])
 
@@ -218,10 +208,8 @@ def _count(
 ) -> None:
     sent, delivered, overheard = counts[0], counts[1], counts[2]
     num_heard, receptions = counts[3], counts[4]
-    is_heard = np.empty(recipient.shape[1], dtype=np.bool_)
-    counts[:] = 0.0
     for b in range(recipient.shape[0]):
-        is_heard[:] = False
+        is_heard = np.zeros(recipient.shape[1], dtype=np.bool_)
         for i in range(recipient.shape[1]):
             sent[b] += recipient[b, i] != i
             sender = heard[b, i]

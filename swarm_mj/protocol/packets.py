@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.presets import bits_per_second
 from swarm_mj.protocol.buffers import ABSENT, NEVER, NO_PARENT, Buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.compiled import compiled
@@ -25,7 +26,7 @@ AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
 
 @dataclass(frozen=True, kw_only=True)
 class PacketField:
-    """Numbers of one kind in a packet: code n stands for `low` + n `step`."""
+    """Numbers of one kind in a packet: code n stands for `low` + n `step`, or what lies beyond."""
 
     name: str
     bits: int  # of one number
@@ -34,22 +35,10 @@ class PacketField:
     step: float = 1.0  # from one number to the next
     unit: str = ""
 
-    def __post_init__(self) -> None:
-        if not 1 <= self.bits <= 64 or self.count < 0:
-            raise ValueError(
-                f"packet field {self.name!r} needs 1 to 64 bits and a count of 0 or more, not "
-                f"{self.bits} bits {self.count} times"
-            )
-
     @property
     def num_bits(self) -> int:
         """Bits of all its numbers."""
         return self.bits * self.count
-
-    def codes(self, values: Float[np.ndarray, "*shape"]) -> Int[np.ndarray, "*shape"]:
-        """Return the nearest codes; numbers beyond the last code are sent as the last."""
-        codes = np.rint((values - self.low) / self.step)
-        return np.clip(codes, 0, 2**self.bits - 1).astype(np.int64)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -130,14 +119,6 @@ def slot_bytes(mission: Mission) -> int | None:
         return None
     bits = mission.bit_rate * mission.window_s * SLOT_WINDOWS
     return math.floor(round(bits / BITS_PER_BYTE, 6))
-
-
-def bits_per_second(rate: float) -> str:
-    """Return a bit rate in words, by the usual prefix."""
-    for prefix, unit in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
-        if rate >= unit:
-            return f"{rate / unit:.4g} {prefix}bit/s"
-    return f"{rate:.4g} bit/s"
 
 
 def fits(packet: Packet, mission: Mission) -> bool:

@@ -11,12 +11,12 @@ from functools import cache
 from typing import ClassVar, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.compiled_window import answer, talk
+from swarm_mj.protocol.compiled_window import answer, silence, talk
 from swarm_mj.protocol.packets import PartialBuffers, entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
@@ -85,7 +85,7 @@ class RequestResponse:
         move: Move,
         channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
-    ) -> tuple[Phase, Phase]:
+    ) -> tuple[Phase, ...]:
         """Play one window from t on [windows], and return the phases of its two slots.
 
         Decisions are trusted; a user's own channel is checked (`checked_decode`).
@@ -116,20 +116,18 @@ class DoubleBroadcast:
         move: Move,
         channel: Channel | VaryingChannel,
         now: Float[np.ndarray, "B"],
-    ) -> tuple[Phase, Phase]:
+    ) -> tuple[Phase, ...]:
         """Play one window; arguments as in `RequestResponse`."""
         noted = self.silence_is_attempt
         recipient = self._addressed(decide(()))
         states = move()
-        t = now + SLOT_WINDOWS
-        first = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
+        first = window(buffers, states, recipient, channel, now, 1, silence_is_attempt=noted)
 
-        recipient = self._addressed(decide((first,)))
+        recipient = self._addressed(decide(first))
         if self.moves_each_slot:
             states = move()
-        t = now + 2.0 * SLOT_WINDOWS
-        second = transmit(buffers, states, recipient, channel, t, silence_is_attempt=noted)
-        return first, second
+        t = now + SLOT_WINDOWS
+        return first + window(buffers, states, recipient, channel, t, 1, silence_is_attempt=noted)
 
     def _addressed(self, recipient: Int[np.ndarray, "B N"]) -> Int[np.ndarray, "B N"]:
         if not self.needs_addressees:
@@ -147,50 +145,19 @@ def window(
     recipient: Int[np.ndarray, "B N"],
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
+    num_slots: int = 2,
     *,
     silence_is_attempt: bool = False,
-) -> tuple[Phase, Phase]:
+) -> tuple[Phase, ...]:
     """Play one communication window: a transmission phase, then a response phase (Alg. 1).
 
-    Buffers are written in place; `states` are true, and fixed during the window; the clock shows
-    the start of the window [windows]. Silence may count as addressing oneself (Eq. 7).
+    A single slot has no responses; there robots address a teammate or, with BROADCAST, everyone
+    (III-B, IV-C). Buffers are written in place; `states` are true, and fixed meanwhile; the clock
+    shows the start of the first slot [windows]. Silence may count as addressing oneself (Eq. 7).
+
+    `compiled_window.talk` does the same in one call, where radio and packets are the paper's.
     """
-    t = now + SLOT_WINDOWS
-    first, second = _slots(buffers, states, recipient, channel, t, 2, silence_is_attempt)
-    return first, second
-
-
-def transmit(
-    buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    *,
-    silence_is_attempt: bool = False,
-) -> Phase:
-    """Play one slot of transmissions (III-B, IV-C); arguments as in `window`, t at its end.
-
-    Robots that transmit address a teammate or, with BROADCAST, everyone.
-    """
-    (phase,) = _slots(buffers, states, recipient, channel, now, 1, silence_is_attempt)
-    return phase
-
-
-def _slots(
-    buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    num_slots: int,
-    silence_is_attempt: bool,
-) -> tuple[Phase, ...]:
-    """Play a slot of transmissions, and a second of responses if there are two, over any channel.
-
-    Arguments are as in `transmit`. `compiled_window.talk` does the same in one call, where radio
-    and packets are the paper's.
-    """
+    now = now + SLOT_WINDOWS
     if type(channel) is FreeSpaceRadio and not isinstance(buffers, PartialBuffers):
         said = talk(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
         return tuple([Phase(said[s, 0], said[s, 1]) for s in range(num_slots)])
@@ -199,11 +166,12 @@ def _slots(
     for slot in range(num_slots):
         t = now + slot * SLOT_WINDOWS
         observe_self(buffers, states, t)
-        sent_to = of_active(states.is_active, respondents(phases[0]) if slot else recipient)
+        sent_to = respondents(phases[0]) if slot else recipient.copy()
+        silence(sent_to, states.is_active)
         heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
-        heard = of_active(states.is_active, heard)
+        silence(heard, states.is_active)
         merge(buffers, heard, entries_sent(buffers, sent_to))
-        phases.append(Phase(recipient=sent_to.copy(), heard=heard))
+        phases.append(Phase(recipient=sent_to, heard=heard))
     return tuple(phases)
 
 
@@ -228,12 +196,3 @@ def channel_at(
         return channel
     slot = np.rint(now * SLOTS_PER_WINDOW).astype(np.int64) - 1
     return channel.at(slot, np.arange(len(now)) if mission is None else mission)
-
-
-def of_active(
-    is_active: Bool[np.ndarray, "B N"] | None, robots: Int[np.ndarray, "B N"]
-) -> Int[np.ndarray, "B N"]:
-    """Return these choices, with inactive robots' own identities for theirs: silence, or no one."""
-    if is_active is None:
-        return robots
-    return np.where(is_active, robots, np.arange(is_active.shape[1], dtype=robots.dtype))

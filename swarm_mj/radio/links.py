@@ -14,6 +14,7 @@ from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.power_law import FREE_SPACE_EXPONENT, PowerLaw, free_space_law, powers_between
 from swarm_mj.radio.reception import (
+    CERTAIN,
     MIN_DISTANCE_M,
     NOBODY,
     Air,
@@ -35,6 +36,8 @@ STD_STEP_DB = 0.5
 MAX_STD_DB = 12.0
 SIGMAS, SIGMA_STEP = 4.0, 0.05  # how far a normal distribution is followed, and how finely
 LEAST_PROBABILITY = 0.02  # what is less counts as 0, which spares schedulers hopeless links
+
+ROUNDING = 1e-9  # more than sums, products and chances lose by rounding, as a share
 
 Curves = Float[np.ndarray, "S R"]  # a probability for each standard deviation and each SINR
 
@@ -103,9 +106,9 @@ def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> 
 
     That error's standard deviation is in dB, without what positions add to it.
     """
-    return links._replace(
-        curves=curves, row=row_of(np.hypot(std_db, 2.0 * DB_PER_NEPER / links.distance_over_std))
-    )
+    std_db = np.hypot(std_db, 2.0 * DB_PER_NEPER / links.distance_over_std)
+    row = np.rint(np.minimum(std_db, MAX_STD_DB) / STD_STEP_DB).astype(np.int64)
+    return links._replace(curves=curves, row=row)
 
 
 @compiled(forceinline=True)
@@ -133,7 +136,7 @@ def air_of(links: Links, transmits: Bool[np.ndarray, "N"]) -> Air:
     return air
 
 
-@compiled()
+@compiled(forceinline=True)
 def incoming_with(links: Links, air: Air, i: int, j: int) -> Incoming:
     """Return all packets at j when i transmits, too; a robot adds nothing at itself."""
     signal_mw, interference_mw = links.received_mw[i, j], links.interference_mw[i, j]
@@ -146,6 +149,20 @@ def chance_of_strongest(links: Links, incoming: Incoming, j: int) -> float:
     others_mw = incoming.total - links.interference_mw[incoming.sender, j]
     ratio = sinr(incoming.strongest, others_mw, links.noise_mw)
     return chance(links, ratio, incoming.sender, j)
+
+
+@compiled(forceinline=True)
+def room_for_interference(links: Links, incoming: Incoming, j: int) -> float:
+    """Return what interference must exceed to ensure that j decodes nothing [mW].
+
+    That allows for rounding. It is inf where there are curves, which reach far.
+    """
+    if links.curves.shape[0] > 0:
+        return np.inf
+    certain = CERTAIN / links.distance_over_std[incoming.sender, j] + ROUNDING
+    limit_mw = incoming.strongest / (links.threshold * max(1.0 - certain, 0.0) ** 2)
+    others_mw = incoming.total * (1.0 - ROUNDING) - links.interference_mw[incoming.sender, j]
+    return limit_mw - others_mw - links.noise_mw * (1.0 - ROUNDING)
 
 
 @compiled()
@@ -207,11 +224,6 @@ def decode_curves(rician_k: float = NO_FADING, success: float = 1.0) -> Curves:
     ]
     curves = success * np.stack(rows)
     return np.where(curves < LEAST_PROBABILITY, 0.0, curves)
-
-
-def row_of(std_db: Float[np.ndarray, "N N"]) -> Int[np.ndarray, "N N"]:
-    """Return the row of `decode_curves` that is nearest to a standard deviation [dB]."""
-    return np.rint(np.minimum(std_db, MAX_STD_DB) / STD_STEP_DB).astype(np.int64)
 
 
 @compiled()

@@ -13,10 +13,11 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.radio.power_law import MeanPowers, compute_powers, place_robots
-from swarm_mj.radio.reception import NOBODY, is_received, received_power, sinr
+from swarm_mj.radio.reception import MIN_DISTANCE_M, NOBODY, is_received, received_power, sinr
 from swarm_mj.system.compiled import compiled
 
 NOISE = 1.0
+MARGIN = 1e-9  # of powers, far more than they are rounded by
 FREE_SPACE = np.zeros((0, 0))  # in place of powers
 
 
@@ -43,6 +44,7 @@ class _Slot(NamedTuple):
     is_sender: Bool[np.ndarray, "N"]
     signal: Float[np.ndarray, "N"]  # of the packet that each robot decodes; 0 is none
     total: Float[np.ndarray, "N"]  # of all packets in the air
+    near_m2: Float[np.ndarray, "N"]  # in free space, closer senders cost it that packet
 
 
 @compiled()
@@ -71,8 +73,9 @@ def write_joined(
             has_joined[b, i] = 0.0
             if is_known[b, i, owner]:
                 belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE, threshold)
-                unknown = np.flatnonzero(~is_known[b, i][asked])
-                num_asked = unknown[0] if len(unknown) > 0 else num_robots
+                num_asked = 0
+                while num_asked < num_robots and is_known[b, i, asked[num_asked]]:
+                    num_asked += 1
                 is_sender = _senders(owner, asked[:num_asked], NOBODY, belief, None, b)
                 for k in range(num_robots):
                     has_joined[b, i, k] = is_sender[k]
@@ -145,7 +148,8 @@ def _senders(
     """Return who sends: the owner of the turn, and who joins it up to the `last` that is asked."""
     num_robots = belief.believed_m.shape[0]
     is_sender = np.zeros(num_robots, dtype=np.bool_)
-    slot = _Slot(is_sender, np.zeros(num_robots), np.zeros(num_robots))
+    near_m2, believed_m = np.zeros(num_robots), belief.believed_m
+    slot = _Slot(is_sender, np.zeros(num_robots), np.zeros(num_robots), near_m2)
     if powers is not None:
         compute_powers(powers, b, owner)
         compute_powers(powers, b, last)
@@ -158,7 +162,8 @@ def _senders(
         # A sender that is asked again may not join either: nobody would gain by it.
         if powers is not None and slot.signal[k] == 0.0:
             compute_powers(powers, b, k)
-        found = _refuser(k, refuser, belief, slot)
+        is_near = squared_distance(believed_m, k, refuser) < near_m2[refuser]
+        found = refuser if is_near else _refuser(k, refuser, belief, slot)
         if found == NOBODY:
             _join(k, belief, slot)
         elif found != k:
@@ -175,7 +180,7 @@ def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
     The `first` is looked at first: who is in the way of one robot is likely to be in the way of
     the next, and nearly all robots are refused.
     """
-    is_sender, signal, total = slot
+    is_sender, signal, total, _ = slot
     if signal[k] > 0.0:
         return k
     is_of_use = False
@@ -197,7 +202,7 @@ def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
 @compiled()
 def _join(k: int, belief: _Belief, slot: _Slot) -> None:
     """Make k a sender: mark whom it reaches, and add its packet to the air."""
-    is_sender, signal, total = slot
+    is_sender, signal, total, near_m2 = slot
     is_sender[k] = True
     for j in range(signal.shape[0]):
         if j != k:
@@ -205,6 +210,9 @@ def _join(k: int, belief: _Belief, slot: _Slot) -> None:
             is_free = not is_sender[j] and signal[j] == 0.0
             if is_free and is_received(sinr(power, total[j], NOISE), belief.threshold):
                 signal[j] = power
+                if belief.power.shape[0] == 0:  # later interference only adds to this
+                    most = (1.0 + MARGIN) * power / belief.threshold - NOISE - total[j]
+                    near_m2[j] = belief.at_1_m / min(power, most) - MIN_DISTANCE_M**2
             total[j] += power
 
 

@@ -19,7 +19,7 @@ from contextlib import AbstractContextManager, suppress
 from pathlib import Path
 from typing import Any, TypeVar, cast
 
-from numba.core import caching, config, types
+from numba.core import caching, types
 from numba.core.codegen import JITCodeLibrary
 from numba.core.compiler import Compiler
 from numba.core.event import Event, Listener, install_listener
@@ -35,16 +35,19 @@ Function = TypeVar("Function", bound=Callable[..., Any])
 
 
 def compiled(
-    *, fastmath: bool | set[str] = False, forceinline: bool = False
+    *, fastmath: bool | set[str] = False, forceinline: bool = False, makes_arrays: bool = True
 ) -> Callable[[Function], Function]:
     """Compile a function when it is first called with arguments of new types.
 
     numba compiles a function with its first caller's assumptions on floats, `fastmath`, unless they
     are said, so here they always are. `forceinline` makes callers take it in: a call with many
-    arrays takes longer than a short function. Type checkers see the function as it was.
+    arrays takes longer than a short function. Counting references to arrays takes longer than short
+    loops do; a function that neither makes nor returns arrays can do without it. Type checkers see
+    the function as it was.
     """
     # Checks for divisions by zero would keep loops that divide from being as fast as they can be.
     options = dict(nopython=True, fastmath=fastmath, error_model="numpy", forceinline=forceinline)
+    options["_nrt"] = makes_arrays
 
     def decorate(function: Function) -> Function:
         plain = inspect.unwrap(function)  # of the checks that tests put around all functions
@@ -66,11 +69,8 @@ class _Loop(CPUDispatcher):
         super().__init__(function, targetoptions=options)
         options = {**options, "no_cpython_wrapper": True}
         self.inner = CPUDispatcher(function, targetoptions=options, pipeline_class=_PartCompiler)
-        numba: Any = config
-        before, numba.CACHE_LOCATOR_CLASSES = numba.CACHE_LOCATOR_CLASSES, LOCATORS
-        with suppress(RuntimeError):  # no place for a cache
+        with suppress(RuntimeError, OSError):  # no place for a cache, or no file, as in notebooks
             self._cache = _Cache(function)
-        numba.CACHE_LOCATOR_CLASSES = before
 
     @property
     def _numba_type_(self) -> types.Dispatcher:
@@ -191,19 +191,3 @@ def _read(path: Path) -> tuple[bytes, list[Path]]:
             file = module / "__init__.py" if module.is_dir() else module.with_suffix(".py")
             files += [file] if file.is_file() else []
     return hashlib.sha256(source).digest(), files
-
-
-class InUsersFolder(caching.UserWideCacheLocator):
-    """In the user's cache folder, if there is one that can be written."""
-
-    def ensure_cache_path(self) -> None:
-        """Refuse the relative `~/.cache` of a user without a home; numba asks by this name."""
-        if not Path(self.get_cache_path()).is_absolute():
-            raise FileNotFoundError(self.get_cache_path())
-        super().ensure_cache_path()
-
-
-LOCATORS = ",".join(
-    f"{place.__module__}.{place.__name__}"
-    for place in (caching.UserProvidedCacheLocator, caching.InTreeCacheLocator, InUsersFolder)
-)

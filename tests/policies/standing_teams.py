@@ -11,7 +11,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import team_views
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import LocalViews, transmit, window
+from swarm_mj.protocol.window import LocalViews, window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -65,10 +65,10 @@ def flooded_team(mission: Mission, seed: int) -> Team:
     states = RobotStates(position_m=position_m[None], velocity_mps=np.zeros((1, len(robots), 2)))
     buffers, now = empty_buffers(1, len(robots)), np.zeros(1)
     for _ in range(2 * rng.integers(0, 10)):
-        now = now + SLOT_WINDOWS
         speaks = rng.random(len(robots)) < 0.2
         anyone = rng.integers(0, len(robots), len(robots))
-        transmit(buffers, states, np.where(speaks, anyone, robots)[None], radio, now)
+        window(buffers, states, np.where(speaks, anyone, robots)[None], radio, now, 1)
+        now = now + SLOT_WINDOWS
     return Team(
         radio=radio, position_m=position_m, timestamp=buffers.timestamp[0], now=float(now[0])
     )

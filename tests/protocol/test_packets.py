@@ -12,8 +12,6 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER, NO_PARENT, empty_buffers, merge
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.packets import (
-    PacketField,
-    bits_per_second,
     check_whole,
     entries_sent,
     fitting,
@@ -59,7 +57,7 @@ def test_a_flown_buffer_comes_back_within_half_a_step(task):
             format(code, f"0{field.bits}b")
             for k in range(len(known))
             for field, values in sent.items()
-            for code in field.codes(values[k : k + 1]).ravel().tolist()
+            for code in codes(field, values[k : k + 1]).ravel().tolist()
         )
         header_bits = sum(field.bits * field.count for field in packet.header)
         weighed = replace(packet, num_entries=len(known)).num_bytes
@@ -77,9 +75,15 @@ def test_a_flown_buffer_comes_back_within_half_a_step(task):
         np.testing.assert_allclose(read[velocity], sent[velocity].ravel(), rtol=0, atol=0.012)
 
 
+def codes(field, values):
+    """The nearest codes; numbers beyond the last code are sent as the last."""
+    steps = np.rint((values - field.low) / field.step)
+    return np.clip(steps, 0, 2**field.bits - 1).astype(int)
+
+
 def rounded(field, values):
     """As a receiver reads them."""
-    return field.low + field.step * field.codes(values)
+    return field.low + field.step * codes(field, values)
 
 
 def test_what_rests_is_read_as_resting_and_what_was_rounded_stays():
@@ -89,17 +93,6 @@ def test_what_rests_is_read_as_resting_and_what_was_rounded_stays():
     once = rounded(position, values)
     assert np.abs(once - values).max() <= position.step / 2 + 1e-9
     np.testing.assert_array_equal(rounded(position, once), once)
-
-
-def test_numbers_beyond_the_last_code_are_sent_as_the_last():
-    field = PacketField(name="age", bits=4, step=0.5)
-    assert rounded(field, np.array([-1.0, 7.5, 100.0])).tolist() == [0.0, 7.5, 7.5]
-
-
-@pytest.mark.parametrize(("bits", "count"), [(0, 1), (65, 1), (8, -1)])
-def test_fields_have_a_width(bits, count):
-    with pytest.raises(ValueError, match="1 to 64 bits"):
-        PacketField(name="x", bits=bits, count=count)
 
 
 @pytest.mark.parametrize(("rate", "holds"), [(6e6, 37_500), (250e3, 1562), (160.0, 1), (159.0, 0)])
@@ -131,11 +124,6 @@ def test_the_rate_that_is_said_to_do_does():
     (said,) = re.findall(r"rate of (\d+) or more", str(refused.value))
     assert said == "540214"
     check_whole("credit", replace(mission, bit_rate=float(said)))
-
-
-def test_rates_are_said_with_the_usual_prefix():
-    said = [bits_per_second(rate) for rate in (12.0, 250e3, 1.5e6, 6e9)]
-    assert said == ["12 bit/s", "250 kbit/s", "1.5 Mbit/s", "6 Gbit/s"]
 
 
 ALL = [-1, -1, -1, -1, -1]  # everyone broadcasts

@@ -16,7 +16,6 @@ from swarm_mj.protocol.window import (
     LocalViews,
     RequestResponse,
     channel_at,
-    transmit,
     window,
 )
 from swarm_mj.simulation.swarm import Swarm
@@ -145,7 +144,7 @@ def test_alg1_silence_counts_as_attempt_when_told_so():
     recipient, now = np.array([[1, 1]]), np.array([0.0])
     window(buffers, standing(2), recipient, to_nobody, now, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 0.5], [0.0, 0.5]]
-    transmit(buffers, standing(2), recipient, to_nobody, now + 3, silence_is_attempt=True)
+    window(buffers, standing(2), recipient, to_nobody, now + 2.5, 1, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 3.0], [0.0, 3.0]]
 
 

@@ -12,16 +12,18 @@ from scipy.stats import norm
 from swarm_mj.mission import paper
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import (
+    STD_STEP_DB,
     air_of,
     decode_curves,
+    doubtful,
     links_between,
     listen,
     lone_probabilities,
     probability_at,
-    row_of,
+    room_for_interference,
 )
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.radio.reception import MIN_DISTANCE_M, NOBODY
+from swarm_mj.radio.reception import MIN_DISTANCE_M, NOBODY, incoming_at
 
 seeds = st.integers(0, 2**32 - 1)
 RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
@@ -93,6 +95,37 @@ def test_eq3_the_air_is_what_the_radio_makes_of_it(seed, num_robots, has_one_mor
     assert probability.tolist() == (expected != robots).tolist()
 
 
+@given(seed=seeds, num_others=st.integers(0, 2), is_certain=st.booleans())
+def test_interference_beyond_the_room_for_it_drowns_the_strongest_packet(
+    seed, num_others, is_certain
+):
+    """A millionth less leaves a chance; robot 0 listens, and robot 1 disturbs it."""
+    rng = np.random.default_rng(seed)
+    num_robots = 3 + num_others
+    position_m = rng.uniform(0.0, 100.0, (num_robots, 2))
+    spread_m = np.zeros(num_robots) if is_certain else rng.uniform(0.0, 8.0, num_robots)
+    links = links_between(RADIO, position_m, spread_m)
+    links = links._replace(received_mw=links.received_mw.copy())  # 1 is too weak to be decoded
+    links.received_mw[1, 0] = 0.0
+    transmits, listens = np.arange(num_robots) > 1, np.arange(num_robots) == 0
+    incoming = incoming_at(air_of(links, transmits), 0)
+    room_mw = room_for_interference(links, incoming, 0)
+    assert (room_mw < 0.0) <= (listened(links, transmits, NOBODY, listens)[1][0] == 0.0)
+    scale_mw = room_mw + links.noise_mw + incoming.total
+    for share, has_chance in ((1e-6, False), (-1e-6, True)):
+        links.interference_mw[1, 0] = room_mw + share * scale_mw
+        if 0.0 < links.interference_mw[1, 0] < np.inf:
+            _, probability = listened(links, transmits, 1, listens)
+            assert (probability[0] > 0.0) == has_chance
+
+
+def test_curves_leave_room_for_any_interference():
+    links = links_between(RADIO, np.array([[0.0, 0.0], [200.0, 0.0]]))
+    faded = doubtful(links, decode_curves(NO_LINE_OF_SIGHT), np.zeros((2, 2)))
+    incoming = incoming_at(air_of(faded, np.array([True, False])), 1)
+    assert room_for_interference(faded, incoming, 1) == np.inf
+
+
 @pytest.mark.parametrize("deviation", [-1.5, -0.5, 0.0, 1.0])
 @pytest.mark.parametrize(
     ("interferer_m", "spread_m", "tolerance"),
@@ -120,9 +153,7 @@ MARGINS_DB = (-12.0, -3.1, 0.4, 2.3, 9.8)
 
 
 def at(curves, margin_db, std_db=0.0):
-    return probability_at(
-        curves, int(row_of(np.full((1, 1), std_db))[0, 0]), 10.0 ** (margin_db / 10.0)
-    )
+    return probability_at(curves, round(std_db / STD_STEP_DB), 10.0 ** (margin_db / 10.0))
 
 
 def test_without_fades_a_packet_decodes_or_not():

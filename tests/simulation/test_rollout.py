@@ -5,7 +5,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.costs import PhaseCounts, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import WindowCosts, mean_hops
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
@@ -23,8 +23,8 @@ def flown_by_hand(age, variance, is_complete, hops, packets):
         velocity_variance_m2ps2=np.array(variance),
         counts=np.array(
             [
-                PhaseCounts(attempted, delivered, overheard, nothing, nothing),
-                PhaseCounts(TRANSMITTED - attempted, answered, nothing, nothing, nothing),
+                [attempted, delivered, overheard, nothing, nothing],
+                [TRANSMITTED - attempted, answered, nothing, nothing, nothing],
             ]
         ),
         is_broadcast=False,
@@ -36,7 +36,7 @@ def broadcast_by_hand(window, packets):
     """The same window with broadcasts in its first phase: sent, heard, receptions."""
     sent, heard, receptions = (np.array(count) for count in packets)
     nothing = np.zeros(2)
-    first = PhaseCounts(sent, nothing, nothing, heard, receptions)
+    first = np.array([sent, nothing, nothing, heard, receptions])
     counts = np.array([first, np.zeros_like(first)])
     return replace(window, costs=window.costs._replace(counts=counts, is_broadcast=True))
 

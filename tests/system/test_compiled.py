@@ -7,7 +7,9 @@ import sys
 from pathlib import Path
 from typing import Any, cast
 
+import numpy as np
 import pytest
+from numba.core.errors import NumbaError
 
 import swarm_mj.system.compiled
 import swarm_mj.system.interrupt
@@ -208,6 +210,33 @@ def test_a_part_is_made_a_machines_in_its_caller_alone():
         name = result.fndesc.mangled_name
         assert bool(result.library.get_pointer_to_function(name)) == is_machines
     assert "alwaysinline" in part.library.get_llvm_str()
+
+
+def test_a_loop_that_makes_no_arrays_counts_no_references():
+    """It cannot make an array."""
+
+    @compiled(makes_arrays=False)
+    def write(row: np.ndarray, k: int) -> None:
+        row[k] = k
+
+    @compiled(makes_arrays=False)
+    def fill(numbers: np.ndarray) -> None:
+        for k in range(numbers.shape[1]):
+            write(numbers[0], k)
+
+    @compiled(makes_arrays=False)
+    def zeros(num: int) -> np.ndarray:
+        return np.zeros(num)
+
+    numbers = np.full((2, 3), 7.0)
+    before = sys.getrefcount(numbers)
+    fill(numbers)
+    assert numbers.tolist() == [[0.0, 1.0, 2.0], [7.0, 7.0, 7.0]]
+    assert sys.getrefcount(numbers) == before
+    (result,) = cast(Any, fill).overloads.values()
+    assert "NRT_incref" not in result.library.get_llvm_str()
+    with pytest.raises(NumbaError, match="returning of array"):
+        zeros(3)
 
 
 def test_what_is_compiled_is_counted_as_it_begins(checkout):

@@ -11,24 +11,26 @@ k, times the probability that it decodes; timestamps are expected ones. Index or
 receives. Times are in slots, float32, which keeps them exact for 8 million windows.
 
 The first flight compiles these functions, so there are few, and they write loops where an array
-expression or a sort would take numba seconds to compile.
+expression or a sort would take numba seconds to compile. They fill arrays that they are given, as
+counting references to arrays takes longer than the search.
 """
 
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
 from swarm_mj.radio.links import (
+    ROUNDING,
     Links,
-    air_of,
     broadcast,
     chance_of_strongest,
     incoming_with,
     listen,
+    room_for_interference,
 )
-from swarm_mj.radio.reception import NOBODY, Air, silent_air
+from swarm_mj.radio.reception import NOBODY, Air, incoming_at
 from swarm_mj.system.compiled import compiled
 
 
@@ -43,6 +45,23 @@ class Problem(NamedTuple):
     depth: int  # how long each is followed, the slot in question included [slots]
 
 
+class _Search(NamedTuple):
+    """The arrays that a search fills, so that its loops need not make any."""
+
+    branch: Float32[np.ndarray, "N N"]  # T of one of the first transmitters that are tried
+    alone: Float[np.ndarray, "N"]  # value of the first slot if i transmits alone
+    gain: Float[np.ndarray, "N N"]  # value of j decoding i, where it can
+    has_news: Bool[np.ndarray, "N"]  # for anyone
+    listens: Bool[np.ndarray, "N"]  # those that do not transmit
+    air: Air
+    # Of the packet that j may decode by this air, and its bounds when i transmits, too:
+    value: Float[np.ndarray, "N"]  # or 0 if it is less
+    rival_mw: Float[np.ndarray, "N"]  # power above which j may decode i instead; inf: never
+    room_mw: Float[np.ndarray, "N"]  # interference above which j decodes nothing
+    heard: Int[np.ndarray, "N"]  # in the end, as in `listen`
+    probability: Float[np.ndarray, "N"]
+
+
 def schedule_slot(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
@@ -53,145 +72,186 @@ def schedule_slot(
 
     Slots that are not free, this one or one of those looked ahead to, are silent.
     """
-    first = NOBODY
-    if problem.width > 1 and is_free[0]:
-        first = _best_first(timestamp, now, problem, is_free)
-    _, transmits = _follow(timestamp, now, problem, first, is_free[:1])
-    return transmits
+    num_robots = len(timestamp)
+    branch, gain = np.empty_like(timestamp), np.empty_like(problem.lone)
+    alone, total, strongest, value, rival_mw, room_mw, probability = np.empty((7, num_robots))
+    has_news, listens = np.empty((2, num_robots), dtype=np.bool_)
+    sender, heard = np.empty((2, num_robots), dtype=np.int64)
+    air = Air(total, strongest, sender)
+    search = _Search(
+        branch, alone, gain, has_news, listens, air, value, rival_mw, room_mw, heard, probability
+    )
+    _schedule(timestamp, now, problem, is_free, search)
+    return ~search.listens
 
 
-def _best_first(
+@compiled(makes_arrays=False)
+def _schedule(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
     problem: Problem,
     is_free: Bool[np.ndarray, "depth"],
-) -> int:
-    """Return the first transmitter of a slot by whose branch most is known, or `NOBODY`."""
-    alone = _values_alone(timestamp, now, problem)
-    best, most_known = int(NOBODY), -np.inf
-    for _ in range(problem.width):
+    search: _Search,
+) -> None:
+    """Choose a slot's transmitters, the first one by whose branch most is known."""
+    num_robots, alone = timestamp.shape[0], search.alone
+    observe_own(timestamp, now)
+    _write_gains(timestamp, problem, search)
+    for i in range(num_robots):
+        alone[i] = 0.0
+        for j in range(num_robots):
+            alone[i] += search.gain[i, j] * problem.lone[i, j]
+    best, most_known = NOBODY, -np.inf
+    for _ in range(problem.width if problem.width > 1 and is_free[0] else 0):
         first = int(np.argmax(alone))
         if alone[first] <= 0.0:
-            return best
+            break
         alone[first] = 0.0
-        known, _ = _follow(timestamp.copy(), now, problem, first, is_free)
+        for i in range(num_robots):
+            for k in range(num_robots):
+                search.branch[i, k] = timestamp[i, k]
+        known = _follow(search.branch, now, problem, first, is_free, search)
         if known > most_known:
             best, most_known = first, known
-    return best
+    _follow(timestamp, now, problem, best, is_free[:1], search)
 
 
-@compiled()
-def _values_alone(
-    timestamp: Float32[np.ndarray, "N N"], now: float, problem: Problem
-) -> Float[np.ndarray, "N"]:
-    """Return the value of the slot that ends now for each robot that might transmit alone."""
-    observe_own(timestamp, now)
-    gain, _ = _gains(timestamp, problem)
-    alone = np.zeros(timestamp.shape[0])
-    for i in range(timestamp.shape[0]):
-        for j in range(timestamp.shape[0]):
-            alone[i] += gain[i, j] * problem.lone[i, j]
-    return alone
-
-
-@compiled()
+@compiled(makes_arrays=False)
 def _follow(
     timestamp: Float32[np.ndarray, "N N"],
     now: float,
     problem: Problem,
     first: int,
     is_free: Bool[np.ndarray, "P"],
-) -> tuple[float, Bool[np.ndarray, "N"]]:
+    search: _Search,
+) -> float:
     """Bring `timestamp` to the end of slots, of which the first begins with this transmitter.
 
-    Return the sum of all timestamps after each of them, and who transmits in the last.
+    Return the sum of all timestamps after each of them; who transmits in the last is in `search`.
     """
-    known, transmits = 0.0, np.zeros(timestamp.shape[0], dtype=np.bool_)
+    known = 0.0
     for p in range(is_free.shape[0]):
         observe_own(timestamp, now + p)
+        for i in range(timestamp.shape[0]):
+            search.listens[i] = True
         if is_free[p]:
-            transmits = _choose(timestamp, problem, first if p == 0 else NOBODY)
+            _choose(timestamp, problem, first if p == 0 else NOBODY, search)
         total = np.float32(0.0)
         for i in range(timestamp.shape[0]):
             for k in range(timestamp.shape[0]):
                 total += timestamp[i, k]
         known += float(total)
-    return known, transmits
+    return known
 
 
-@compiled()
+@compiled(makes_arrays=False)
 def _choose(
-    timestamp: Float32[np.ndarray, "N N"], problem: Problem, first: int
-) -> Bool[np.ndarray, "N"]:
-    """Return a slot's transmitters, a given first one among them, and bring T to its end."""
-    num_robots, links = timestamp.shape[0], problem.links
-    gain, has_news = _gains(timestamp, problem)
-    air = silent_air(num_robots)
-    heard, probability = np.empty(num_robots, dtype=np.int64), np.empty(num_robots)
-    transmits = np.zeros(num_robots, dtype=np.bool_)
-    listens = np.ones(num_robots, dtype=np.bool_)
-    best, value = first, 0.0
-    if first != NOBODY:
-        value = _value(links, gain, air, transmits, first)
-    while True:
-        if best != NOBODY:
-            transmits[best], listens[best] = True, False
-            broadcast(links, air, best)
-        best, best_value = NOBODY, value * problem.min_share
-        for i in range(num_robots):
-            if listens[i] and has_news[i]:
-                with_i = _value(links, gain, air, transmits, i)
-                if with_i > best_value:
-                    best, best_value = i, with_i
-        if best == NOBODY:
-            break
-        value = best_value
+    timestamp: Float32[np.ndarray, "N N"], problem: Problem, first: int, search: _Search
+) -> None:
+    """Choose a slot's transmitters, a given first one among them, and bring T to its end."""
+    links, air, listens = problem.links, search.air, search.listens
+    _write_gains(timestamp, problem, search)
+    _sum_air(links, search)
+    best, value = _best_addition(problem, search, first, 0.0)
+    while best != NOBODY:
+        listens[best] = False
+        broadcast(links, air, best)
+        best, value = _best_addition(problem, search, NOBODY, value * problem.min_share)
     # The sum of powers anew, since its rounding depends on the order of the transmitters.
-    listen(links, air_of(links, transmits), NOBODY, listens, heard, probability)
+    _sum_air(links, search)
+    listen(links, air, NOBODY, listens, search.heard, search.probability)
     # In place: a robot that transmits decodes nothing, so its row is as it was sent.
-    merge_expected(timestamp, heard, probability, timestamp)
-    return transmits
+    merge_expected(timestamp, search.heard, search.probability, timestamp)
 
 
-@compiled()
-def _value(
-    links: Links,
-    gain: Float[np.ndarray, "N N"],
-    air: Air,
-    transmits: Bool[np.ndarray, "N"],
-    also: int,
-) -> float:
+@compiled(makes_arrays=False)
+def _sum_air(links: Links, search: _Search) -> None:
+    """Add up all packets in the air, in the order of their senders."""
+    air = search.air
+    for j in range(search.listens.shape[0]):
+        air.total[j], air.strongest[j], air.sender[j] = 0.0, 0.0, j
+    for i in range(search.listens.shape[0]):
+        if not search.listens[i]:
+            broadcast(links, air, i)
+
+
+@compiled(makes_arrays=False)
+def _best_addition(problem: Problem, search: _Search, only: int, least: float) -> tuple[int, float]:
+    """Return who raises the slot's value most if it transmits, too, and that value.
+
+    That is `NOBODY` where no value is above the least. Of robots that are as good, it is the first.
+    If it is said who may, nobody else is tried.
+    """
+    links, num_robots = problem.links, search.listens.shape[0]
+    for j in range(num_robots):
+        search.value[j], search.rival_mw[j], search.room_mw[j] = 0.0, np.inf, np.inf
+        if search.listens[j]:
+            search.value[j] = max(_value_at(links, search, j, j), 0.0)
+            search.rival_mw[j] = search.air.strongest[j]
+            search.room_mw[j] = room_for_interference(links, incoming_at(search.air, j), j)
+    best, best_value = NOBODY, least
+    for i in range(num_robots):
+        if search.listens[i] and search.has_news[i] and only in (NOBODY, i):
+            with_i = _bound(problem, search, i)
+            if with_i > best_value:
+                with_i = _value_with(links, search, i)
+            if with_i > best_value:
+                best, best_value = i, with_i
+    return best, best_value
+
+
+@compiled(makes_arrays=False, forceinline=True, fastmath={"reassoc"})
+def _bound(problem: Problem, search: _Search, i: int) -> float:
+    """Return no less than what the slot is worth if i transmits, too.
+
+    No packet decodes more probably than in silence, or than before.
+    """
+    links, total = problem.links, 0.0
+    for j in range(search.listens.shape[0]):
+        if links.received_mw[i, j] > search.rival_mw[j]:
+            total += max(search.gain[i, j] * problem.lone[i, j], 0.0)
+        elif links.interference_mw[i, j] <= search.room_mw[j]:
+            total += search.value[j]
+    return total * (1.0 + ROUNDING)
+
+
+@compiled(makes_arrays=False, forceinline=True)
+def _value_with(links: Links, search: _Search, also: int) -> float:
     """Return the value of the slot when this robot transmits in addition to those in the air."""
     value = 0.0
-    for j in range(gain.shape[0]):
-        if not transmits[j] and j != also:
-            incoming = incoming_with(links, air, also, j)
-            news = gain[incoming.sender, j]
-            if incoming.strongest > 0.0 and news != 0.0:
-                value += news * chance_of_strongest(links, incoming, j)
+    for j in range(search.listens.shape[0]):
+        if search.listens[j] and j != also:
+            value += _value_at(links, search, also, j)
     return value
 
 
-@compiled()
-def _gains(
-    timestamp: Float32[np.ndarray, "N N"], problem: Problem
-) -> tuple[Float[np.ndarray, "N N"], Bool[np.ndarray, "N"]]:
-    """Return the value of j decoding i, where it can, and which robots have news for anyone."""
-    num_robots = timestamp.shape[0]
-    gain = np.zeros((num_robots, num_robots))
-    has_news = np.zeros(num_robots, dtype=np.bool_)
-    for i in range(num_robots):
-        for j in range(num_robots):
+@compiled(makes_arrays=False, forceinline=True)
+def _value_at(links: Links, search: _Search, also: int, j: int) -> float:
+    """Return the value of what j may decode; a robot that is j itself adds nothing to the air."""
+    incoming = incoming_with(links, search.air, also, j)
+    news = search.gain[incoming.sender, j]
+    if incoming.strongest > 0.0 and news != 0.0:
+        return news * chance_of_strongest(links, incoming, j)
+    return 0.0
+
+
+@compiled(makes_arrays=False)
+def _write_gains(timestamp: Float32[np.ndarray, "N N"], problem: Problem, search: _Search) -> None:
+    """Fill in the value of j decoding i, where it can, and which robots have news for anyone."""
+    gain, has_news = search.gain, search.has_news
+    for i in range(timestamp.shape[0]):
+        has_news[i] = False
+        for j in range(timestamp.shape[0]):
+            gain[i, j] = 0.0
             if problem.lone[i, j] > 0.0:
                 gain[i, j] = _gain(timestamp[i], timestamp[j], problem.weight[j])
                 if gain[i, j] > 0.0:
                     has_news[i] = True
-    return gain, has_news
 
 
 # Adding in any order lets the compiler use its vectors. Whole slots add up exactly; products to
 # rounding, so robots that plan alike need machines alike.
-@compiled(fastmath={"reassoc", "nnan", "nsz"})
+@compiled(makes_arrays=False, fastmath={"reassoc", "nnan", "nsz"})
 def _gain(
     newer: Float32[np.ndarray, "N"],
     older: Float32[np.ndarray, "N"],
@@ -205,7 +265,7 @@ def _gain(
 
 
 # Apart from `_gain`, whose permission to reorder sums would extend to this product.
-@compiled()
+@compiled(makes_arrays=False)
 def _weighed(r: np.floating, weight: np.floating) -> np.floating:
     """Return a squared rise times its weight, multiplied in this order."""
     return r * (weight * r)

@@ -69,17 +69,14 @@ class Planner(BroadcastPolicy):
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw each mission's orders of turns and forget; arguments as in `Policy.start`."""
-        self._teams = [
+        self.teams = [
             _Team(num_robots, self._mission, self._belief, self._settings, rng) for rng in rngs
         ]
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by its plan or by the discovery."""
-        return np.stack([self.transmits_in(view, b) for b, view in enumerate(team_views(views))])
-
-    def transmits_in(self, view: TeamView, b: int) -> Bool[np.ndarray, "N"]:
-        """Return the same in mission b alone."""
-        return self._teams[b].transmits(view)
+        each = zip(self.teams, team_views(views), strict=True)
+        return np.stack([team.transmits(view) for team, view in each])
 
 
 class _Team:

@@ -110,7 +110,7 @@ class RestingPlanner(BroadcastPolicy):
             knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
             self._has_moved |= np.any(knows_motion, axis=1)
             for b in np.flatnonzero(self._has_moved).tolist():
-                by_snapshot = self._moving.transmits_in(each[b], b)
+                by_snapshot = self._moving.teams[b].transmits(each[b])
                 transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]
         return transmits
 

@@ -71,6 +71,4 @@ class PlannerSettings:
     min_log_odds: float = 5.0  # of a hypothesis, over the channel that was believed
     cautious_stds: float = 0.5  # by which a packet is expected to be weaker than in the mean
     disturbing_stds: float = 1.0  # by which it is expected to disturb others more
-    max_std_db: float = (
-        2.0  # largest spread that schedulers assume of a link, as their errors last [dB]
-    )
+    max_std_db: float = 2.0  # most that schedulers assume of a link, as their errors last [dB]
