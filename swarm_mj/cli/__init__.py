@@ -1,6 +1,6 @@
 """The command line, one file per command.
 
-`swarm-mj fly | evaluate | train | figures | replay | scene | policies | doctor | bench`.
+`swarm-mj fly | evaluate | train | curves | figures | replay | scene | policies | doctor | bench`.
 
 Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted by Ctrl-C, SIGTERM or a
 hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is gone are no errors.
@@ -28,6 +28,7 @@ COMMANDS = {  # each is a module here: `fly` holds its options, `FlyOptions`, an
     "policies": "List the communication policies: what each knows and sends.",
     "evaluate": "Fly policies over the same missions and say where they stand.",
     "train": "Train a communication policy by PPO.",
+    "curves": "Show the learning curves of training runs.",
     "figures": "Draw the paper's figures from results.",
     "replay": "Open a replay in rerun's viewer, or make a video or a picture of it.",
     "scene": "Write the scene of a mission as one MJCF file.",

@@ -17,8 +17,6 @@ from swarm_mj.system.fields import as_typed
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
 BEYOND = ("radio", *CALLED_WITH)  # columns that the paper's missions leave empty
-MAX_HOPS = 1000  # a receptive field
-MAX_DECISIONS = 10**12  # a training
 
 
 class NoPointsError(ValueError):
@@ -55,11 +53,10 @@ def preset_of(results: Sequence[Result]) -> str:
 
 
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
-    """Select the results of a figure, one per policy and x, in their order; skip other regimes.
+    """Select the results of a figure, in their order; skip other regimes.
 
     Raises:
-        ValueError: There are none, two are of the same policy and x, or they cannot be compared
-            with each other or with the paper.
+        ValueError: There are none, or they cannot be compared with each other or with the paper.
     """
     preset = preset_of(results)
     regime = figure.mission(preset)
@@ -71,18 +68,13 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
             f"{figure.name} has no points: none of the {len(results)} results has {described}; "
             f"make them with `{figure.command(preset)}`, or choose others with --figure"
         )
-    places = set()
     for result in found:
         _check_comparable(figure, result, found[0])
-        place = (result.policy, _x(figure, result))
-        if place in places:
-            raise ValueError(f"{figure.name} has two results of {_where(figure, result)}; keep one")
-        places.add(place)
     return found
 
 
 def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
-    """Return the published curves of a cost above 0, by its column, then those of the results."""
+    """Return the published curves of a cost, by its column, then those of the results."""
     drawn = []
     rows = [point for point in points() if (point.figure, point.cost) == (figure.published, cost)]
     for method, its in groupby(rows, key=lambda point: point.method):
@@ -95,17 +87,12 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
         x = _x(figure, result)
         # A policy without a receptive field is level: the same at both ends of the axis.
         ends = (figure.xs[0], figure.xs[-1]) if x is None else (x,)
-        mean, sem = _positive(figure, cost, result)
+        mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
+        sem = math.nan if sem is None else sem
         own.setdefault((result.policy, x is None), []).extend((end, mean, sem) for end in ends)
     for (policy, is_level), values in own.items():
         drawn.append(_curve(policy, values, is_level=is_level, carries_more=policy in more))
     return drawn
-
-
-def budgets(results: Sequence[Result]) -> list[int]:
-    """Return the team decisions of trainings, ascending; raise ValueError for what is no number."""
-    numbers = (_count(result, "decisions", 1, MAX_DECISIONS) for result in results)
-    return sorted({number for number in numbers if number is not None})
 
 
 def _curve(method: str, rows: Iterable[tuple[float, float, float]], **traits: bool) -> Curve:
@@ -113,32 +100,12 @@ def _curve(method: str, rows: Iterable[tuple[float, float, float]], **traits: bo
     return Curve(method=method, x=x, mean=mean, sem=sem, **traits)
 
 
-def _positive(figure: ResultFigure, cost: str, result: Result) -> tuple[float, float]:
-    """Return a cost's mean and standard error; raise ValueError for what no log axis shows."""
-    mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
-    if mean <= 0.0:
-        raise ValueError(
-            f"{cost}_mean must be above 0, not {mean:g} ({_where(figure, result)}); make it "
-            f"again with `{figure.command(result.preset)}`"
-        )
-    return mean, math.nan if sem is None else sem
-
-
 def _x(figure: ResultFigure, result: Result) -> float | None:
     """Return a result's place on the axis; None for a policy without a receptive field."""
     if figure.sweeps_missions:
         return float(getattr(result, figure.x_name))
-    x = _count(result, figure.x_name, 0, MAX_HOPS)
+    x = config_of(result).get(figure.x_name)
     return None if x is None else float(x)
-
-
-def _count(result: Result, name: str, low: int, high: int) -> int | None:
-    """Return a whole number of a result's config, if it has one; raise ValueError for another."""
-    number = config_of(result).get(name)
-    if number is not None and not (type(number) is int and low <= number <= high):
-        rule = f"{name} of {result.policy} must be a number from {low} to {high}"
-        raise ValueError(f"{rule}, not {number!r:.60}")
-    return number
 
 
 def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> None:

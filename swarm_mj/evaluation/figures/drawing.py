@@ -12,16 +12,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.curves import (
-    Curve,
-    NoPointsError,
-    budgets,
-    curves,
-    results_of,
-)
+from swarm_mj.evaluation.figures.curves import Curve, NoPointsError, curves, results_of
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, look_of, styled, write_caption
 from swarm_mj.evaluation.published import Panel, ResultFigure
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
 
 TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75
 LEFT, RIGHT, MARGIN = 0.085, 0.8, 0.985  # of the width; the curves' names stand on the right
@@ -41,10 +35,7 @@ PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
 def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[str] = ()) -> Figure:
-    """Draw our curves and the published ones, of these methods or of all.
-
-    Raises ValueError as `results_of` and `curves` do.
-    """
+    """Draw our curves and the published ones, of these methods or all; raise as `results_of`."""
     found = results_of(figure, results)
     if methods:
         found = [result for result in found if result.policy in methods] or found[:1]
@@ -93,8 +84,9 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
         f"{figure.name}, preset {result.preset}: {result.episodes} missions, seeds {result.seed} "
         f"to {last}, {result.num_windows} windows each; {made_by}"
     ]
-    if decisions := budgets(results):
-        least, most = f"{decisions[0]:,}", f"{decisions[-1]:,}"
+    budgets = [config_of(each).get("decisions") for each in results]
+    if decisions := [budget for budget in budgets if budget]:
+        least, most = f"{min(decisions):,}", f"{max(decisions):,}"
         numbers = most if least == most else f"{least} to {most}"
         lines.append(f"our GNNs: trained on {numbers} {PAPERS_BUDGET}")
     return "\n".join(lines)

@@ -1,7 +1,5 @@
 """Curves hold the results' numbers and the published ones; what cannot be compared is refused."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from synthetic import altered, result, sweep
@@ -66,10 +64,6 @@ def test_a_policy_with_receptive_fields_has_a_curve_over_them():
     np.testing.assert_array_equal(curve.x, [1.0, 3.0])
     np.testing.assert_array_equal(curve.mean, [30.0, 20.0])
     assert not curve.is_level
-    with pytest.raises(
-        ValueError, match="receptive_field of learned must be a number from 0 to 1000"
-    ):
-        found(FIG3, [result("learned", config={"receptive_field": "wide"})])
 
 
 def test_other_regimes_are_passed_over():
@@ -82,10 +76,8 @@ def test_other_regimes_are_passed_over():
     assert "--task random-walk --preset reference --robots 10 20 40 60 80" in str(refused.value)
 
 
-def test_a_single_episode_has_no_error_and_no_cost_is_zero():
+def test_a_single_episode_has_no_error():
     assert np.isnan(found(FIG4, [result("tdma", aoi_sem=None)])["tdma", False].sem[0])
-    with pytest.raises(ValueError, match=r"aoi_mean must be above 0, not 0 \(mst at range_ratio"):
-        found(FIG4, [result("mst", aoi_mean=0.0)])
 
 
 @pytest.mark.parametrize(
@@ -105,21 +97,7 @@ def test_mixed_results_are_refused(name, value, complaint):
     mixed = [result("tdma"), result("mst", **{name: value})]
     with pytest.raises(ValueError, match=complaint) as refused:
         results_of(FIG4, mixed)
-    assert "swarm-mj evaluate --policy tdma " in str(refused.value)
-    assert " --task stationary " in str(refused.value)
-
-
-def test_two_results_of_the_same_policy_and_regime_are_refused():
-    with pytest.raises(ValueError, match=r"two results of mst at range_ratio 0\.25; keep one"):
-        results_of(FIG4, [result("mst"), result("tdma"), result("mst", aoi_mean=2.0)])
-    with pytest.raises(ValueError, match="fig3 has two results of mst; keep one"):
-        results_of(FIG3, [result("mst"), result("mst")])
-
-
-@pytest.mark.parametrize("config", ["", "[1]", "{"])
-def test_a_config_that_is_no_json_object_is_refused(config):
-    with pytest.raises(ValueError, match="config of mst must be a JSON object"):
-        results_of(FIG4, [replace(result("mst"), config=config)])
+    assert "swarm-mj evaluate --task stationary " in str(refused.value)
 
 
 def test_the_caption_says_on_how_much_our_gnns_were_trained():
@@ -133,6 +111,3 @@ def test_the_caption_says_on_how_much_our_gnns_were_trained():
     assert "trained on 40,000 team decisions each" in caption(FIG3, results)
     longer = result("GNN", config={"receptive_field": 2, "decisions": 1_500_000})
     assert "trained on 40,000 to 1,500,000 team decisions" in caption(FIG3, [*results, longer])
-    for decisions in ("many", True, 0, 1.5, [1]):
-        with pytest.raises(ValueError, match="decisions of GNN must be a number from 1"):
-            caption(FIG3, [result("GNN", config={"decisions": decisions})])
