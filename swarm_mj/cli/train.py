@@ -3,7 +3,7 @@
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, get_args
 
 from rich.console import Console
 
@@ -14,7 +14,7 @@ from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.learning import run_folder
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import Progress
-from swarm_mj.learning.settings import Training
+from swarm_mj.learning.settings import Device, Training
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
@@ -40,6 +40,13 @@ class TrainOptions:
     minutes: float | None = same_as(Limits, "minutes")
     patience: int | None = same_as(Limits, "patience")
     replay_every: int | None = same_as(Limits, "replay_every")
+    device: str | None = setting(
+        None,
+        "where the networks learn: cpu, or cuda, an NVIDIA GPU; auto takes a GPU if there is one. "
+        "Missions are on the CPU",
+        choices=get_args(Device),
+        shown="auto, --resume: as before",
+    )
     init: Path | None = setting(
         None, "begin with a stored policy", metavar="POLICY", is_common=True
     )
@@ -68,9 +75,12 @@ def run(options: TrainOptions) -> int:
         console.print(f"{ending}; the last checkpoint is kept.\nGo on:    {go_on}", markup=False)
         return FAILED if is_memory else INTERRUPTED
     if not watch.has_begun:
+        limit = asked.limits.minutes
+        of = "" if limit is None else f" of {limit:g}"
         console.print(
-            "Nothing was left to train: raise --budget or --minutes, which count in all, or give "
-            "--patience 0 if the run stopped early."
+            f"Nothing was left to train: the run made {progress.decisions:,} decisions in "
+            f"{progress.minutes:.1f}{of} minutes. Raise --budget or --minutes, which count in all "
+            "and leave time to select a policy, or give --patience 0 if the run stopped early."
         )
     if watch.has_stopped:
         console.print(f"Interrupted after {progress.decisions:,} decisions; all is kept.")
@@ -81,7 +91,8 @@ def run(options: TrainOptions) -> int:
 def _asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
-    run = replace(run, limits=asked_limits(run.limits, options))
+    device = options.device or run.device
+    run = replace(run, limits=asked_limits(run.limits, options), device=device)
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
     written = (Output("run", options.out / name) for name in names)
     check_outputs(*written, inputs=[options.init] if options.init else [])

@@ -108,17 +108,22 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
         begun = "the policy given by --init" if run.init else "the untrained policy"
         yield f"Training did not help: {begun} did best, and is the one kept."
     for name, cost in choice.others.items():
-        if cost.behind > 0.0:
-            difference = Cost(mean=cost.behind, sem=cost.behind_sem)
-            behind = _amount(difference, run.training.reward)
-            other = NAMES.get(name, name)
-            is_clear = cost.behind_sem is not None and cost.behind > CLEAR * cost.behind_sem
-            place = (
-                f"loses to {other} by {behind}"
-                if is_clear
-                else f"is no better than {other}, which is ahead by {behind}"
-            )
-            yield f"The policy kept {place} on the same missions."
+        yield from _comparison(run, NAMES.get(name, name), cost)
+
+
+def _comparison(run: TrainingRun, other: str, cost: Cost) -> Iterator[str]:
+    """Yield a sentence about another policy, unless the policy kept clearly beats it."""
+    error = cost.behind_sem
+    is_clear = error is not None and abs(cost.behind) > CLEAR * error
+    by = _amount(Cost(mean=abs(cost.behind), sem=error), run.training.reward)
+    if cost.behind > 0.0:
+        weaker = f"is no better than {other}, which is ahead by {by}"
+        place = f"loses to {other} by {by}" if is_clear else weaker
+    elif is_clear or error is None:
+        return
+    else:
+        place = f"is level with {other}: it is ahead by only {by}"
+    yield f"The policy kept {place} on the same missions."
 
 
 def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:

@@ -59,10 +59,7 @@ def asked_settings(
 ) -> Training:
     """Return the settings of a new run: the usual ones of its credit, changed by those given.
 
-    These are by their places; `init` is the policy that the run begins with.
-
-    Raises:
-        ValueError: A value is unknown or outside its range, or contradicts another.
+    `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
     own = _part("", given)
     network = _part("network", given)
@@ -138,10 +135,7 @@ def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
     if asked is None:
         return -(-usual // num_sizes) * num_sizes
     if asked % num_sizes:
-        fewer = asked // num_sizes * num_sizes
-        ways = ", ".join(str(n) for n in (fewer, fewer + num_sizes) if n > 0)
-        rule = f"missions must be a multiple of the {num_sizes} team sizes, such as {ways}"
-        raise ValueError(f"{rule}, not {asked}")
+        raise ValueError(f"missions must be a multiple of the {num_sizes} team sizes, not {asked}")
     return asked
 
 

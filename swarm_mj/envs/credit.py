@@ -14,8 +14,9 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.checks import checked_decode
+from swarm_mj.protocol.compiled_window import silence
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, merge_timestamps, observe_own
-from swarm_mj.protocol.window import Phase, channel_at, of_active, respondents
+from swarm_mj.protocol.window import Phase, channel_at, respondents
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
@@ -40,13 +41,13 @@ def credits_of(
         The credit of every robot, summed over pairs of robots [windows]; it may be negative.
     """
     if is_active is not None:
-        recipient = of_active(is_active, recipient)
+        recipient = recipient.copy()
+        silence(recipient, is_active)
         # Nothing is gained by news of a robot that has failed: it is not counted in the age.
         timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
 
-    def replayed(
-        rows: Int[np.ndarray, "W"], recipient: Int[np.ndarray, "W N"]
-    ) -> Float[np.ndarray, "W"]:
+    # Without shapes: they would be made anew in every window, which takes as long as the replay.
+    def replayed(rows: np.ndarray, recipient: np.ndarray) -> np.ndarray:
         """Return the gains of the windows of these missions with other recipients [windows]."""
         fresh, its = snapshot_channel(channel), None if is_active is None else is_active[rows]
         return gain(timestamp, position_m[rows], recipient, fresh, now[rows], rows, its)
@@ -105,9 +106,11 @@ def gain(
     Arguments are as in `credits_of`, one row a window; `mission` is that of the T it starts from.
     """
     first, second = (channel_at(channel, now + n * SLOT_WINDOWS, mission) for n in (1, 2))
-    heard = of_active(is_active, checked_decode(first, position_m, recipient))
+    heard = checked_decode(first, position_m, recipient)
+    silence(heard, is_active)
     answered = respondents(Phase(recipient=recipient, heard=heard))
-    heard_answer = of_active(is_active, checked_decode(second, position_m, answered))
+    heard_answer = checked_decode(second, position_m, answered)
+    silence(heard_answer, is_active)
     gained = np.empty(len(mission))
     _replay(timestamp, mission, heard, heard_answer, now, gained)
     return gained

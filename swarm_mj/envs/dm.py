@@ -36,10 +36,7 @@ def make_environment(
     """Return one mission as an environment of dm_control, and so of dm_env.
 
     A step is a window, an episode is a mission: the first one with the seed given, the next one
-    with `seed + 1`, and so on. The components are those of `Swarm`.
-
-    Raises:
-        ValueError: The seed is negative, or no connected team could be drawn.
+    with `seed + 1`, and so on. The components are those of `Swarm`; raises as that does.
     """
     swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene)
     return control.Environment(SwarmPhysics(swarm, seed), SwarmTask(seed))

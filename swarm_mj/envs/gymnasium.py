@@ -15,7 +15,7 @@ from gymnasium.utils import EzPickle
 from jaxtyping import Bool, UInt8
 
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
-from swarm_mj.envs.options import check_reset, make_team_batch, team_spaces
+from swarm_mj.envs.options import make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
@@ -111,8 +111,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begin a mission, whose seed is in `info`; raise ValueError for any options."""
-        check_reset(options or {})
+        """Begin a mission, whose seed is in `info`; options are ignored."""
         super().reset(seed=seed, options=options)
         self.batch.restart([seed_or_next(seed, self.np_random)])
         return self._seen()

@@ -22,9 +22,10 @@ from swarm_mj.envs.mission_batch import (
     seed_or_next,
     seeds_from,
 )
-from swarm_mj.envs.options import check_count, check_reset, make_team_batch, team_spaces
+from swarm_mj.envs.options import make_team_batch, team_spaces
 from swarm_mj.mission import Mission
-from swarm_mj.system.fields import did_you_mean
+from swarm_mj.policies.gnn.feature_sets import is_own_set
+from swarm_mj.system.fields import check_names
 
 MODES = ("rgb_array",)  # a window on the screen would show one mission of many
 
@@ -50,12 +51,11 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Take B, a mission or its task, and options of `make_batch`; raises as that does."""
         modes = {"autoreset_mode": autoreset_mode, "render_mode": render_mode}
         EzPickle.__init__(self, num_envs, mission, **modes, **options)
-        check_count("num_envs", num_envs)
+        batch = make_team_batch(mission, num_envs, **options)
         self.num_envs = num_envs
-        self.autoreset_mode = _mode_of(autoreset_mode)  # TorchRL looks for it here
+        self.autoreset_mode = AutoresetMode(autoreset_mode)  # TorchRL looks for it here
         self._screen, self.render_mode = Screen(render_mode, MODES), render_mode
         self._mission, self._options = mission, options
-        batch = make_team_batch(mission, num_envs, **options)
         self.metadata = rendering(batch.mission, MODES) | {"autoreset_mode": self.autoreset_mode}
         # Of each environment: the batch that flies it, and its row there.
         self._batches = np.full(num_envs, batch, dtype=object)
@@ -81,10 +81,11 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         None, for missions drawn from the last seeds given.
 
         Raises:
-            ValueError: Not one seed or one bool per environment, another option, or no connected
-                team could be drawn.
+            ValueError: Not one seed or one bool per environment, or no connected team could be
+                drawn.
+            TypeError: There is no such option.
         """
-        check_reset(options or {}, ("reset_mask",))
+        check_names("reset", options or {}, ("reset_mask",))
         super().reset(seed=seed if isinstance(seed, int) else None)
         mask = np.asarray((options or {}).get("reset_mask", [True] * self.num_envs))
         if mask.shape != (self.num_envs,) or mask.dtype != np.bool_ or not mask.any():
@@ -101,7 +102,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         infos: Info = {}
         envs = np.flatnonzero(mask)
         self._begin(envs, [seeds[env] for env in envs.tolist()], infos)
-        return self._copied(), infos
+        return self._shown(), infos
 
     def step(
         self, actions: np.ndarray
@@ -137,7 +138,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         begun = np.flatnonzero(ends if is_same_step else was_over)
         if begun.size:
             self._begin(begun, [None] * begun.size, infos)
-        return self._copied(), reward, np.zeros_like(ends), ends, infos
+        return self._shown(), reward, np.zeros_like(ends), ends, infos
 
     def render(self) -> tuple[UInt8[np.ndarray, "H W 3"], ...] | None:
         """Draw all missions, in the mode "rgb_array"; raises OSError without OpenGL."""
@@ -187,22 +188,17 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         for name, each in batch.observation.items():
             if is_all:  # by reference: picking rows copies every number, twice
                 self._seen[name] = each
-            else:
+            else:  # in a copy: what was shown before is the user's own
+                self._seen[name] = self._seen[name].copy()
                 self._seen[name][envs] = each[rows]
         for name, each in batch.infos().items():
             own = infos.setdefault(name, np.zeros(self.num_envs, dtype=each.dtype))
             is_own = infos.setdefault(f"_{name}", np.zeros(self.num_envs, dtype=np.bool_))
             own[envs], is_own[envs] = each[rows], True
 
-    def _copied(self) -> Observation:
-        return {name: each.copy() for name, each in self._seen.items()}
-
-
-def _mode_of(mode: str | AutoresetMode) -> AutoresetMode:
-    modes = [each.value for each in AutoresetMode]
-    if mode not in (*modes, *AutoresetMode):
-        raise ValueError(
-            f"autoreset_mode must be one of {', '.join(modes)}, not {mode!r:.80}"
-            f"{did_you_mean(mode, modes)}"
-        )
-    return AutoresetMode(mode)
+    def _shown(self) -> Observation:
+        """Return the user's own arrays: new ones, or copies of what `reset_mask` shows again."""
+        is_shown_again = self.autoreset_mode == AutoresetMode.DISABLED
+        # A user's own features may write into the same array again.
+        copies = is_shown_again or is_own_set(self._options.get("features", ""))
+        return {name: each.copy() if copies else each for name, each in self._seen.items()}

@@ -148,7 +148,7 @@ class MissionBatch:
         # Silence is always allowed: a user's own features may forget it, and samplers need one way.
         may_address = self.graphs.may_address.reshape(shape) | np.eye(num_robots, dtype=np.bool_)
         seen = {
-            "action_mask": may_address.astype(np.int8),
+            "action_mask": may_address.view(np.int8),
             "observation": self.graphs.node.reshape(*shape, self.num_features),
         }
         if self.with_parents:  # a copy: graphs may share P with the swarm, which writes it in place

@@ -1,7 +1,6 @@
 """Options and spaces that all environments share: what users ask for, and what they get."""
 
 import copy
-from collections.abc import Collection
 from dataclasses import replace
 from numbers import Integral
 from typing import Any
@@ -59,14 +58,18 @@ def make_batch(
         TypeError: A field is not one of `Mission`'s, the features are no name, or a component
             cannot be called.
     """
-    check_count("num_missions", num_missions)
+    if not isinstance(num_missions, Integral) or num_missions < 1:
+        raise ValueError(f"the number of missions must be 1 or more, not {num_missions!r}")
     mission = _mission_of(mission, preset, fields)
     components = Components(channel=channel, controller=controller, scene=scene)
     # Copies: a component may draw or remember, and another environment may be given the same one.
     components = copy.deepcopy(components.made(mission))
     arena_of(mission)  # refuses one that is not there
     _check_reward(reward, mission, components.controller)
-    _load_named(features)
+    if not isinstance(features, str):  # stored policies keep the name
+        raise TypeError(f'features must be a name, such as "module:Name", not {features!r:.80}')
+    if is_own_set(features):
+        load_features(features)
     return MissionBatch(
         mission,
         num_missions,
@@ -75,21 +78,6 @@ def make_batch(
         with_parents=with_parents,
         components=components,
     )
-
-
-def check_count(what: str, number: object) -> None:
-    """Raise ValueError unless a number of missions, or of environments, is positive."""
-    if not isinstance(number, Integral) or number < 1:
-        raise ValueError(f"{what} must be 1 or more, not {number!r}")
-
-
-def check_reset(options: Collection[str], known: Collection[str] = ()) -> None:
-    """Raise ValueError for an option that `reset` does not have."""
-    for name in options:
-        if name not in known:
-            raise ValueError(
-                f"reset has no option {name!r:.80}; it has {', '.join(known) or 'none'}"
-            )
 
 
 def make_team_batch(mission: Mission | str, num_missions: int = 1, **options: Any) -> MissionBatch:
@@ -114,24 +102,7 @@ def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, An
                 f"the preset {mission.preset}; leave it out"
             )
         return replace(mission, **fields)
-    if "task" in fields:
-        raise TypeError(
-            f"the environment's name or first argument settles the task, here {mission!r:.80}; "
-            "leave task= out"
-        )
     return make_mission(task=mission, preset=preset or Mission().preset, **fields)
-
-
-def _load_named(features: object) -> None:
-    """Load a user's own features; raise TypeError for no name, as stored policies keep the name."""
-    if not isinstance(features, str):
-        is_class = isinstance(features, type)
-        name = f"{features.__module__}:{features.__qualname__}" if is_class else "module:Name"
-        raise TypeError(
-            f'features must be named, as stored policies keep the name; write features="{name}"'
-        )
-    if is_own_set(features):
-        load_features(features)
 
 
 def _check_reward(reward: str, mission: Mission, controller: Controller | None) -> None:
@@ -143,11 +114,6 @@ def _check_reward(reward: str, mission: Mission, controller: Controller | None) 
             "another task, or reward aoi"
         )
     if reward == "credit":
-        if mission.failure_fraction > 0.0:
-            raise ValueError(
-                "reward credit needs robots that do not fail, but failure_fraction is "
-                f"{mission.failure_fraction:g}; set it to 0, or choose reward aoi"
-            )
         check_whole("reward credit", mission)
 
 

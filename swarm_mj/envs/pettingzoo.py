@@ -6,6 +6,7 @@ import numpy as np
 from gymnasium import Space
 from gymnasium.utils import EzPickle, seeding
 from jaxtyping import Float32, UInt8
+from pettingzoo import ParallelEnv
 
 from swarm_mj.envs.gymnasium import MODES, Screen, modes_here, rendering
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
@@ -13,13 +14,6 @@ from swarm_mj.envs.options import make_batch, robot_spaces
 from swarm_mj.envs.truth import truth, truth_space
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.checks import check_robots
-
-try:
-    from pettingzoo import ParallelEnv
-except ModuleNotFoundError as error:
-    raise ModuleNotFoundError(
-        "swarm_mj.envs.pettingzoo needs pettingzoo; install it by `pip install pettingzoo`"
-    ) from error
 
 Action = int | np.integer[Any]
 NAME = {"name": "swarm_mj_v0"}

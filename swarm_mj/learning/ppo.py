@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 import torch
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from stable_baselines3 import PPO
 from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.policies import ActorCriticPolicy
@@ -16,16 +16,48 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import Tensor
 
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
-from swarm_mj.learning.settings import PpoSettings, Training
+from swarm_mj.learning.settings import Device, PpoSettings, Training
 from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import recipient_logits
 
+CPU = torch.device("cpu")
 
-def make_model(training: Training) -> PPO:
+
+class DevicePpo(PPO):
+    """PPO whose rollouts are on the CPU, and whose passes over them are on a device."""
+
+    optimises_on = CPU
+
+    def train(self) -> None:
+        """Learn from the rollout, and return to the CPU."""
+        self._move(self.optimises_on)
+        try:
+            super().train()
+        finally:
+            self._move(CPU)
+
+    def _move(self, device: torch.device) -> None:
+        if self.optimises_on != CPU:
+            self.policy.to(device)
+            self.rollout_buffer.device = device
+            optimizer = self.policy.optimizer
+            optimizer.load_state_dict(optimizer.state_dict())  # Adam's moments follow the weights
+
+
+def optimising_device(device: Device) -> torch.device:
+    """Return where networks are optimised; raise ValueError if this machine has no such device."""
+    has_cuda = torch.cuda.is_available()
+    if device == "cuda" and not has_cuda:
+        raise ValueError("torch finds no CUDA device on this machine; choose device cpu, or auto")
+    return torch.device("cuda") if has_cuda and device != "cpu" else CPU
+
+
+def make_model(training: Training, device: Device = "cpu") -> PPO:
     """Make PPO over fresh missions (III-C).
 
-    Raises ValueError if the missions or the minibatches cannot be made of these settings.
+    Raises ValueError if the missions or the minibatches cannot be made of these settings, or this
+    machine lacks the device, which optimises the networks.
     """
     torch.set_num_threads(training.threads)
     ppo, drops = training.ppo, training.drops_silence
@@ -34,7 +66,7 @@ def make_model(training: Training) -> PPO:
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
-        model = PPO(
+        model = DevicePpo(
             GnnActorCritic,
             env,
             learning_rate=ppo.learning_rate,
@@ -49,11 +81,13 @@ def make_model(training: Training) -> PPO:
             vf_coef=ppo.value,
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,
+            device=CPU,
             normalize_advantage=not drops,  # a credit's zero means something
             rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
             rollout_buffer_kwargs={"silent_share": ppo.silent_share} if drops else None,
             policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
+    model.optimises_on = optimising_device(device)
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
     return model
@@ -121,16 +155,16 @@ class GnnActorCritic(ActorCriticPolicy):
                 own[name][: len(tensor)].copy_(tensor)
 
     def _robots(
-        self, obs: dict[str, Tensor], owner: Int[Tensor, "R"]
+        self, obs: dict[str, Tensor], owner: Int[Tensor, "R"], is_valued: Bool[Tensor, "R N"]
     ) -> tuple[Float[Tensor, "R N"], Float[Tensor, "R N"]]:
-        """Logits over recipients, and a value for every node, of every robot's graph."""
+        """Logits over recipients, and the values of nodes that count, of every robot's graph."""
         node, parent = obs["node"].flatten(0, -3), obs["parent"].long().flatten(0, -2)
         may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
         output = self.network(node, parent, may_address)
         if self._training.shares_trunk:
             output, values = output[:, :, :-1], output[:, :, -1]  # the last number of each node
         else:
-            values = self.value_network(node, parent)[:, :, 0]
+            values = self.value_network(node, parent, is_valued)[:, :, 0]
         silence_logit = self._training.silence_logit
         logits = recipient_logits(output, owner, may_address, silence_logit, has_turn.flatten())
         return logits, values
@@ -140,16 +174,17 @@ class GnnActorCritic(ActorCriticPolicy):
     ) -> tuple[Float[Tensor, "E *robots N"], Float[Tensor, "E"]]:
         """Return the logits of each environment's decisions, and its value."""
         assert isinstance(obs, dict)
+        num_nodes = obs["may_address"].shape[-1]
+        own = torch.eye(num_nodes, dtype=torch.bool, device=obs["may_address"].device)
         if "owner" in obs:
             owner = obs["owner"].long()
-            logits, values = self._robots(obs, owner.squeeze(1))
+            logits, values = self._robots(obs, owner.squeeze(1), own[owner.squeeze(1)])
             return logits, values.gather(1, owner).squeeze(1)
         shape, is_robot = obs["may_address"].shape[:2], obs["is_robot"].bool()
-        everyone = torch.arange(shape[1], device=is_robot.device)
-        logits, values = self._robots(obs, everyone.repeat(shape[0]))
         counted = is_robot[:, :, None] & is_robot[:, None, :]
-        if not self._training.sums_nodes:
-            counted = counted & torch.eye(shape[1], dtype=torch.bool, device=counted.device)
+        counted = counted if self._training.mission.preset == "reference" else counted & own
+        owner = torch.arange(num_nodes, device=own.device).repeat(shape[0])
+        logits, values = self._robots(obs, owner, counted.flatten(0, 1))
         value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)
         return logits.unflatten(0, shape), value
 

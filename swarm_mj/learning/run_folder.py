@@ -10,20 +10,20 @@ from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from swarm_mj.learning.selection import OTHER_FLIGHTS, num_missions
-from swarm_mj.learning.settings import MAX_DECISIONS, Training
+from swarm_mj.learning.selection import OTHER_FLIGHTS, Row, num_missions
+from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check, setting
-from swarm_mj.system.reading import read_document, read_file
+from swarm_mj.system.reading import read_document, read_file, read_rows
 from swarm_mj.system.writing import write_json
 
 SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
 INIT, REPLAYS, TENSORBOARD = "init.safetensors", "replays", "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
-MAX_BYTES = 1_000_000  # of the settings
+MAX_BYTES, MAX_CURVE_BYTES = 1_000_000, 10_000_000  # of the settings, of the curve
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 PATIENCE = {"robot": 8, "team": 40}  # evaluations
 KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
@@ -80,6 +80,7 @@ class TrainingRun:
     limits: Limits
     command: str = ""  # that began it
     init: Path | None = None  # the stored policy that it begins with
+    device: Device = "auto"  # that optimises the networks, in this session
 
 
 def write_run(folder: Path, run: TrainingRun) -> None:
@@ -89,17 +90,17 @@ def write_run(folder: Path, run: TrainingRun) -> None:
     write_json(folder / SETTINGS, header | asdict(run) | {"init": init})
 
 
-def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
+def read_run(folder: Path, named: Collection[str] | None = ()) -> TrainingRun:
     """Return what a run was asked for when it began, or last went on.
 
     Users' own components, as `module:Name`, must be `named`: to go on runs their code, and a folder
-    may come from anyone. Raises ValueError if one is not, if there is no run, or if its settings
-    are damaged, foreign or of another version; OSError if they cannot be read.
+    may come from anyone; None is to look only. Raises ValueError if one is not, if there is no run,
+    or if its settings are damaged, foreign or of another version; OSError if they cannot be read.
     """
     path = folder / SETTINGS
     if not os.path.lexists(path):
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
-    text = read_file(path, "settings", MAX_BYTES, folder=folder)
+    text = read_file(path, "settings", MAX_BYTES)
     try:
         run = read_document(text, FORMAT, FORMAT_VERSION, TrainingRun)
     except ValueError as error:
@@ -107,7 +108,7 @@ def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
             f"settings {path} are damaged, no run's, or from an earlier version: {error}"
         ) from error
     for name in run.training.own.values():
-        if name not in named:
+        if named is not None and name not in named:
             raise ValueError(
                 f"{folder} goes on with someone's own {name:.200}; if you trust that code, give "
                 f"the run's {run.training.own_options} again"
@@ -115,18 +116,28 @@ def read_run(folder: Path, named: Collection[str] = ()) -> TrainingRun:
     return run
 
 
+def read_curve(path: Path) -> list[Row]:
+    """Return a learning curve, a row an evaluation; raise ValueError if the file holds none."""
+    _, rows = read_rows(path, "learning curve", MAX_CURVE_BYTES)
+    try:
+        curve = [{name: float(cell) for name, cell in row.items() if cell} for _, row in rows]
+        if not all(row["decisions"] >= 0 and row["aoi"] >= 0 for row in curve):
+            raise ValueError("a cell is negative, or no number")
+        return curve
+    except (KeyError, ValueError) as error:
+        raise ValueError(f"{path} is no learning curve, of decisions and aoi: {error}") from error
+
+
 def check_new(folder: Path) -> None:
     """Raise ValueError if a folder holds a run, or anything else, so that none can begin there."""
     if folder.exists() and not folder.is_dir():
         raise ValueError(f"run {folder} is a file; name a folder")
-    if (folder / SETTINGS).exists():
-        raise ValueError(
-            f"{folder} holds a run; go on with it by --resume, or name another folder by --out"
-        )
     left = (".part", ".lock")  # by a run that was killed while it began
     others = sorted(path.name for path in folder.glob("*") if not path.name.endswith(left))
     if others:
-        raise ValueError(f"{folder} holds {others[0]}, which is no run's; name another by --out")
+        raise ValueError(
+            f"{folder} holds {others[0]}; go on with a run by --resume, or name another folder"
+        )
 
 
 def check_begun(folder: Path) -> None:

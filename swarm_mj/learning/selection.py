@@ -8,9 +8,6 @@ import math
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
-
-from msgspec import Meta
 
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
@@ -35,9 +32,6 @@ FLOWN_SHARE = 0.5  # of a run's decisions, for its choice; they cost less than l
 RESERVED_SHARE = 0.5  # of a run's minutes, at most, kept back for its choice
 MIN_GAIN = 0.005  # of the objective, that counts as learning
 
-# Ranges of a run's progress, where it is read back.
-Count = Annotated[int, Meta(ge=0, le=2**62)]
-Amount = Annotated[float, Meta(ge=0.0, le=1e30)]
 Row = dict[str, float]
 
 
@@ -45,20 +39,20 @@ Row = dict[str, float]
 class Cost:
     """A policy's age of information [windows], or its velocity variance [m²/s²]."""
 
-    mean: Amount
-    sem: Amount | None  # None of one mission
+    mean: float
+    sem: float | None  # None of one mission
     behind: float = 0.0  # how much more the policy that is kept costs on the same missions
-    behind_sem: Amount | None = None
+    behind_sem: float | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Choice:
     """The policy that is kept, and its cost on missions that did not choose it."""
 
-    decisions: Count  # of teams, that it learned from
-    run_decisions: Count  # that the run had made when it was chosen
-    num_finalists: Count
-    num_missions: Count  # of each team size that chose it, and as many others that tell its cost
+    decisions: int  # of teams, that it learned from
+    run_decisions: int  # that the run had made when it was chosen
+    num_finalists: int
+    num_missions: int  # of each team size that chose it, and as many others that tell its cost
     kept: Cost
     others: dict[str, Cost]  # on the same missions: `COMPARED`, and `first`
 
@@ -70,11 +64,11 @@ class Accumulator:
     The logger's own means would not survive an interruption: these are in the checkpoint.
     """
 
-    seconds: Amount = 0.0
-    decisions: Count = 0  # of teams
-    age_windows: Amount = 0.0  # summed over the decisions
-    attempted: Count = 0  # packets
-    delivered: Count = 0
+    seconds: float = 0.0
+    decisions: int = 0  # of teams
+    age_windows: float = 0.0  # summed over the decisions
+    attempted: int = 0  # packets
+    delivered: int = 0
 
     def add(self, batches: Iterable[WindowCosts]) -> None:
         """Add a window of all missions, but no time."""
@@ -100,14 +94,14 @@ class Accumulator:
 class Progress:
     """The state of a run, but for its weights and missions."""
 
-    decisions: Count = 0  # of teams, in all sessions
-    minutes: Amount = 0.0  # in all sessions, evaluations included
-    next_replay: Count = 0  # team decisions
+    decisions: int = 0  # of teams, in all sessions
+    minutes: float = 0.0  # in all sessions, evaluations included
+    next_replay: int = 0  # team decisions
     curve: list[Row] = field(default_factory=list)  # one row an evaluation
     since_evaluation: Accumulator = field(default_factory=Accumulator)
     optimiser: Row = field(default_factory=dict)  # what PPO last logged of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
-    evaluation_minutes: Amount = 0.0  # that the last one took
+    evaluation_minutes: float = 0.0  # that the last one took
 
     @property
     def has_chosen(self) -> bool:

@@ -13,6 +13,7 @@ from swarm_mj.policies.policy_config import GnnShape, check_fit
 from swarm_mj.system.fields import check, check_value, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
+Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
 Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team is paid
 # First seeds of the missions of evaluations, of those that choose a policy, and of those that tell
 # its cost. Training and environments draw from 2^40 on.
@@ -153,11 +154,6 @@ class Training:
     def own_options(self) -> str:
         """The options that name them."""
         return " ".join(f"--{kind} {name:.200}" for kind, name in self.own.items())
-
-    @property
-    def sums_nodes(self) -> bool:
-        """True if a team's value sums all nodes of all graphs, as in the authors' code."""
-        return self.mission.preset == "reference"
 
     @property
     def drops_silence(self) -> bool:

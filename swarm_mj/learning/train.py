@@ -65,7 +65,7 @@ class TrainingSession(BaseCallback):
         super().__init__()
         self._run, self._training = run, run.training
         self._folder, self._listener = folder, listener
-        self.ppo = make_model(run.training)
+        self.ppo = make_model(run.training, run.device)
         self._env = env_of(self.ppo)
         self._aoi = math.nan
         self._goes_on = True
@@ -194,7 +194,7 @@ class TrainingSession(BaseCallback):
             self._count_time()
             means, begun = progress.since_evaluation.means(), progress.minutes
             on_window = partial(self._report, "Evaluating")
-            costs = held_out.evaluate(training, network.to(self.ppo.device), on_window)
+            costs = held_out.evaluate(training, network, on_window)
         except Stopped:
             return
         self._count_time()

@@ -98,6 +98,21 @@ def ctrl_c_at(method, *calls):
 
 
 @pytest.mark.usefixtures("here")
+def test_the_device_is_kept_until_another_is_named(monkeypatch, capsys):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    for given, kept in (
+        (("--device", "cpu", *SMALL, "--budget", 128), "cpu"),
+        (("--resume",), "cpu"),
+        (("--resume", "--device", "auto", "--budget", 256), "auto"),
+    ):
+        assert train("--out", "r", *given) == 0
+        assert read_run(Path("r")).device == kept
+    assert train("--out", "r", "--resume", "--device", "cuda") == 2
+    assert "torch finds no CUDA device on this machine" in capsys.readouterr().err
+    assert read_run(Path("r")).device == "auto"
+
+
+@pytest.mark.usefixtures("here")
 def test_ctrl_c_finishes_the_rollout_and_tells_how_to_go_on(capsys):
     with ctrl_c_at("_on_step", 40):
         assert train("--out", "r", *SMALL, "--budget", 512) == 130
@@ -149,7 +164,9 @@ def test_limits_are_kept_and_may_be_moved(here, capsys):
     limits = read_run(here / "r").limits
     assert (limits.decisions, limits.minutes) == (None, 1e-6)
     assert read_run(here / "r").command.endswith("--evaluate-every 128 --budget 128")
-    capsys.readouterr()
+    said = capsys.readouterr().err
+    assert "Nothing was left to train: the run made 256 decisions in " in said
+    assert " of 1e-06 minutes. Raise --budget or --minutes, which count in all" in said
 
 
 @pytest.mark.usefixtures("here")

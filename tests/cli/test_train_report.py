@@ -66,6 +66,10 @@ def test_the_policy_kept_stands_beside_others_with_what_they_know():
             {"tdma": Cost(mean=21.0, sem=0.5, behind=0.75, behind_sem=0.5)},
             "is no better than tdma, which is ahead by 0.75 ± 0.50 windows on the same missions.",
         ),
+        (
+            {"tdma": Cost(mean=22.5, sem=0.5, behind=-0.25, behind_sem=0.5)},
+            "is level with tdma: it is ahead by only 0.25 ± 0.50 windows on the same missions.",
+        ),
         (  # one mission is too few to lose
             {"tdma": Cost(mean=20.0, sem=None, behind=9.0, behind_sem=None)},
             "is no better than tdma, which is ahead by 9.00 windows on the same missions.",

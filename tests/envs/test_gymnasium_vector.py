@@ -66,7 +66,7 @@ def test_reset_mask_begins_some_and_leaves_the_others(mode):
     envs = both(mode)
     ours, theirs = envs
     same(ours.reset(seed=[7, 8, 9]), theirs.reset(seed=[7, 8, 9]))
-    step, num_alone = None, 0
+    step, num_alone, shown = None, 0, []
     # The last two overlap: who leaves a batch of two must not take it along.
     masks = {2: [True, False, False], 4: [True, True, False], 5: [True, False, True]}
     for t, action in enumerate(actions(30)):
@@ -81,8 +81,13 @@ def test_reset_mask_begins_some_and_leaves_the_others(mode):
             assert "reset_mask" in options[0]  # it is the user's
         step = ours.step(action)
         same(step, theirs.step(action))
+        if mode == AutoresetMode.DISABLED:  # a user's own writing is not shown again
+            step[0]["observation"][...] = 7.0
+        shown.append((step[0], copy.deepcopy(step[0])))
         num_alone += step[3].sum() == 1
     assert num_alone > 2  # they ended at different times
+    for observation, held in shown:  # nor are a user's arrays written later
+        same(observation, held)
 
 
 def test_made_by_name():
@@ -137,3 +142,29 @@ def test_refused_actions():
         env.step(np.full((3, 5), 5))
     with pytest.raises(ValueError, match="whose agents are robots"):
         SwarmVectorEnv(2, reward="credit")
+
+
+OWN = """
+from dataclasses import replace
+from swarm_mj.policies.gnn.graphs import PaperFeatures
+
+class Keeps(PaperFeatures):
+    kept = None
+
+    def graphs(self, views):
+        seen = super().graphs(views)
+        if self.kept is None:
+            self.kept = seen.node.copy()
+        self.kept[...] = seen.node
+        return replace(seen, node=self.kept)
+"""
+
+
+def test_own_features_may_write_into_the_same_array_again(tmp_path, monkeypatch):
+    monkeypatch.syspath_prepend(tmp_path)
+    (tmp_path / "kept_array.py").write_text(OWN)
+    env = SwarmVectorEnv(NUM_ENVS, "random-walk", features="kept_array:Keeps", **SMALL)
+    held, _ = env.reset(seed=1)
+    before = copy.deepcopy(held)
+    env.step(actions(1)[0])
+    same(held, before)

@@ -1,5 +1,6 @@
 """What users ask for by other libraries' names, and what they are told."""
 
+import inspect
 import re
 from pathlib import Path
 from typing import get_args
@@ -10,9 +11,8 @@ import pytest
 from gymnasium import spaces
 
 from swarm_mj.envs import environment_id, register_environments
-from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import _load_named, make_batch, robot_spaces, team_spaces
+from swarm_mj.envs.options import make_batch, robot_spaces, team_spaces
 from swarm_mj.mission import Task
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
@@ -26,15 +26,16 @@ REFUSED = {
         "swarm_mj/RandomWalk-v0"
     ),
     "one of .*; did you mean random-walk": lambda: make_batch("random_walk"),
-    "here 'flocking'; leave task= out": lambda: gymnasium.make(
+    "multiple values for keyword argument 'task'": lambda: gymnasium.make(
         "swarm_mj/Flocking-v0", task="stationary"
     ),
     r"give it to reset\(seed=...\)": lambda: gymnasium.make("swarm_mj/Flocking-v0", seed=1),
-    r'features="swarm_mj\.policies\.gnn\.graphs:PaperFeatures"': lambda: _load_named(PaperFeatures),
-    "no option 'mask'; it has none": lambda: SwarmEnv(**SMALL).reset(**RESET),
-    "no option 'mask'; it has reset_mask": lambda: SwarmVectorEnv(2, **SMALL).reset(**RESET),
-    "num_envs must be 1 or more, not 0": lambda: SwarmVectorEnv(0, **SMALL),
-    "NextStep, SameStep, Disabled, not 'Same'; did you mean": lambda: SwarmVectorEnv(
+    'such as "module:Name", not <class .*PaperFeatures': lambda: inspect.unwrap(make_batch)(
+        features=PaperFeatures
+    ),
+    "argument 'mask'; did you mean reset_mask": lambda: SwarmVectorEnv(2, **SMALL).reset(**RESET),
+    "number of missions must be 1 or more, not 0": lambda: SwarmVectorEnv(0, **SMALL),
+    "'Same' is not a valid AutoresetMode": lambda: SwarmVectorEnv(
         1, autoreset_mode="Same", **SMALL
     ),
 }

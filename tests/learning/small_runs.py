@@ -49,7 +49,7 @@ class StopAfter:
 def run(training, folder, decisions=192, listener=go_on, *, init=None, is_resumed=False, **limits):
     """Trains; checkpoints stand between all rollouts."""
     limits = Limits(**{"decisions": decisions, "checkpoint_every_s": 0.0} | limits)
-    asked = TrainingRun(training=training, limits=limits, init=init)
+    asked = TrainingRun(training=training, limits=limits, init=init, device="cpu")
     return train(asked, folder, listener=listener, is_resumed=is_resumed)
 
 

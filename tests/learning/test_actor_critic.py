@@ -112,6 +112,20 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
     torch.testing.assert_close(model.policy.predict_values(observation), value)
 
 
+@pytest.mark.parametrize(("preset", "nodes"), [("paper", 5), ("reference", 25)])
+def test_a_teams_values_ask_for_the_nodes_that_count_only(preset, nodes, monkeypatch):
+    model, _ = model_of("team", preset, (5,))
+    network, asked = model.policy.value_network, []
+
+    def forward(node, parent, is_wanted):
+        asked.append(is_wanted.sum(dim=1))
+        return node.new_zeros(*parent.shape, 1)
+
+    monkeypatch.setattr(network, "forward", forward)
+    model.policy.predict_values(as_tensors(model.get_env().reset()))
+    assert asked[0].tolist() == [nodes // 5] * 5 * 4  # by the graphs of 4 missions
+
+
 def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
     """Those of different robots are independent."""
     torch.manual_seed(1)

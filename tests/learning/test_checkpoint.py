@@ -1,9 +1,7 @@
 """Checkpoints: sound ones come back to the last bit; all others are refused and run nothing."""
 
-import copy
 import math
 import pickle
-import zipfile
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +9,7 @@ import pytest
 import torch
 from small_runs import difference, run, small_training
 
-from swarm_mj.learning.checkpoint import IN_A_ROW, load, restore, save
+from swarm_mj.learning.checkpoint import load, save
 from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT
 from swarm_mj.learning.selection import Accumulator, Progress
@@ -50,8 +48,8 @@ def without(name):
     ("share", "change", "complaint"),
     [
         *((share, None, "c.pt is damaged, or none; begin a new") for share in (0.0, 0.3, 0.999)),
-        (1.0, lambda state: state.clear(), "c.pt is no checkpoint"),
-        (1.0, lambda s: s.update(version=99), "version 99, and this swarm_mj reads 5; resume with"),
+        (1.0, lambda state: state.clear(), r"c.pt is damaged, or another run's \("),
+        (1.0, lambda s: s.update(version=99), "another version of swarm_mj wrote it"),
         (1.0, without("weights"), r"c.pt is damaged, or another run's \("),
     ],
 )
@@ -70,7 +68,7 @@ def test_a_sound_one_is_taken_by_its_own_run_alone(kept, tmp_path):
 
 
 def test_progress_comes_back_to_the_last_bit(tmp_path):
-    row = dict.fromkeys(sorted(IN_A_ROW), 1 / 3)
+    row = dict.fromkeys(("decisions", "aoi", "objective"), 1 / 3)
     progress = Progress(
         minutes=0.1 + 0.2,
         next_replay=12,
@@ -88,17 +86,6 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
     assert not difference(networks[0].state_dict(), policy_of(model).acting_network().state_dict())
 
 
-def test_one_that_would_grow_when_it_is_read_is_refused(kept, tmp_path):
-    (tmp_path / "c.pt").write_bytes(kept)
-    with zipfile.ZipFile(tmp_path / "c.pt") as archive:
-        parts = {name: archive.read(name) for name in archive.namelist()}
-    with zipfile.ZipFile(tmp_path / "c.pt", "w", zipfile.ZIP_DEFLATED) as archive:
-        for name, part in parts.items():
-            archive.writestr(name, part)
-    with pytest.raises(ValueError, match="is damaged, or none"):
-        load(tmp_path / "c.pt", TRAINING, make_model(TRAINING))
-
-
 def test_one_that_would_run_code_does_not(tmp_path):
     class Trap:
         def __reduce__(self):
@@ -111,42 +98,6 @@ def test_one_that_would_run_code_does_not(tmp_path):
     assert not (tmp_path / "sprung").exists()
 
 
-def test_one_that_is_too_large_missing_or_elsewhere_is_refused(kept, tmp_path):
-    run_of = make_model(TRAINING)
-    with pytest.raises(ValueError, match="there is no checkpoint"):
-        load(tmp_path / "none.pt", TRAINING, run_of)
-    (tmp_path / "run").mkdir()
-    (tmp_path / "kept.pt").write_bytes(kept)
-    (tmp_path / "run" / "c.pt").symlink_to(tmp_path / "kept.pt")
-    with pytest.raises(ValueError, match="is a link that leads out of"):
-        load(tmp_path / "run" / "c.pt", TRAINING, run_of)
-    with (tmp_path / "large.pt").open("wb") as file:
-        file.truncate(10**9)
-    with pytest.raises(ValueError, match=r"large.pt may have up to \d+ bytes, not 1000000000"):
-        load(tmp_path / "large.pt", TRAINING, run_of)
-
-
-@pytest.mark.parametrize(
-    ("change", "complaint"),
-    [
-        (lambda state: state.update(normaliser={}), "normaliser must have mean, var, count"),
-        (lambda state: state["normaliser"]["var"].fill_(-1.0), "variance, is negative"),
-        (lambda state: state["normaliser"]["returns"].fill_(math.inf), "returns has numbers"),
-    ],
-)
-def test_what_normalises_rewards_is_checked(flock, change, complaint):
-    """The fault tests craft all other parts of a state."""
-    training, kept = flock
-    state = copy.deepcopy(kept)
-    change(state)
-    with pytest.raises(ValueError, match=complaint):
-        restore(state, make_model(training))
-
-
-@pytest.fixture(scope="module")
-def flock(tmp_path_factory):
-    """Settings of a team whose rewards are normalised, and the state of its run's checkpoint."""
-    training = small_training("team", "flocking", reward="velocity-variance")
-    folder = tmp_path_factory.mktemp("flock")
-    run(training, folder, 32)
-    return training, torch.load(folder / CHECKPOINT, weights_only=True)
+def test_one_that_is_missing_is_refused(tmp_path):
+    with pytest.raises(ValueError, match=r"checkpoint .* cannot be found"):
+        load(tmp_path / "none.pt", TRAINING, make_model(TRAINING))

@@ -1,6 +1,7 @@
 """What PPO is given, its rollouts without most of the silent rows, and its advantages."""
 
 import copy
+import itertools
 from dataclasses import replace
 
 import numpy as np
@@ -114,6 +115,73 @@ def test_threads_are_torchs():
         assert torch.get_num_threads() == 2
     finally:
         torch.set_num_threads(before)
+
+
+@pytest.mark.parametrize(
+    ("device", "has_cuda", "kind"), [("auto", True, "cuda"), ("auto", False, "cpu")]
+)
+def test_auto_is_cuda_where_torch_finds_it(device, has_cuda, kind, monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: has_cuda)
+    model = make_model(small_training(), device)
+    assert model.optimises_on.type == kind
+    assert model.device.type == "cpu"  # for rollouts, with or without it
+
+
+def test_a_missing_gpu_is_an_error(monkeypatch):
+    monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
+    with pytest.raises(ValueError, match="torch finds no CUDA device on this machine; choose"):
+        make_model(small_training(), "cuda")
+
+
+def learned(device, monkeypatch):
+    """Weights, and where networks were moved and minibatches made, in two rollouts on a device."""
+    model, places = make_model(small_training()), []
+    policy, buffer = model.policy, model.rollout_buffer
+    move, evaluate, act = policy.to, policy.evaluate_actions, policy.forward
+
+    def noted(what, function):
+        def noting(*given):
+            places.append((what, str(given[0] if what == "to" else buffer.device)))
+            return function(*given)
+
+        return noting
+
+    for what, name, function in (
+        *(("to", "to", move), ("learns", "evaluate_actions", evaluate)),
+        ("flies", "forward", act),
+    ):
+        monkeypatch.setattr(policy, name, noted(what, function))
+    model.optimises_on = torch.device(device)
+    model.learn(2 * 8 * model.n_envs)
+    weights = [weight.detach().clone() for weight in policy.parameters()]
+    moments = [each["exp_avg"] for each in policy.optimizer.state.values()]
+    return [*weights, *moments], [place for place, _ in itertools.groupby(places)]
+
+
+def test_networks_learn_on_the_device_and_fly_on_the_cpu(monkeypatch):
+    """No other device is sure to be there, so the CPU goes by a second name."""
+    expected, places = learned("cpu", monkeypatch)
+    assert places == [("flies", "cpu"), ("learns", "cpu")] * 2
+    found, places = learned("cpu:0", monkeypatch)
+    rollout = [("flies", "cpu"), ("to", "cpu:0"), ("learns", "cpu:0"), ("to", "cpu")]
+    assert places == rollout * 2
+    assert all(map(torch.equal, expected, found))
+
+
+@pytest.mark.skipif(not torch.cuda.is_available(), reason="needs a GPU")
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_a_gpu_learns_what_the_cpu_does(credit):
+    """Up to rounding, in a rollout; and goes on from what a CPU has learned, and back."""
+    weights = []
+    for device in ("cpu", "cuda"):
+        model = make_model(small_training(credit), device)
+        model.learn(8 * model.n_envs)
+        weights.append([weight.detach().clone() for weight in model.policy.parameters()])
+        moved = make_model(small_training(credit), "cuda" if device == "cpu" else "cpu")
+        moved.policy.load_state_dict(model.policy.state_dict())
+        moved.policy.optimizer.load_state_dict(model.policy.optimizer.state_dict())
+        moved.learn(8 * model.n_envs)
+    torch.testing.assert_close(*weights, rtol=1e-2, atol=1e-4)
 
 
 # The rollout without most of the silent rows.

@@ -17,6 +17,7 @@ from swarm_mj.learning.run_folder import (
     TrainingRun,
     check_begun,
     check_new,
+    read_curve,
     read_run,
     rollout_bytes,
     training_needs,
@@ -97,8 +98,8 @@ def test_runs_begin_in_folders_of_their_own(tmp_path):
     write_run(tmp_path / "run", RUN)
     for name, complaint in (
         ("file", "file is a file; name a folder"),
-        ("empty", r"holds thesis.tex, which is no run's"),
-        ("run", "holds a run; go on with it by --resume"),
+        ("empty", "holds thesis.tex; go on with a run"),
+        ("run", "holds settings.json; go on with a run by --resume"),
     ):
         with pytest.raises(ValueError, match=complaint):
             check_new(tmp_path / name)
@@ -156,3 +157,26 @@ def test_replays_of_a_training_are_counted():
     each = ON_DISK.of(training.mission, training.mission.num_windows)
     assert ten.file - none.file == pytest.approx(11 * each)
     assert ten.memory > none.memory
+
+
+def test_a_curve_is_read_by_the_names_of_its_columns_and_empty_cells_are_left_out(tmp_path):
+    path = tmp_path / "curve.csv"
+    path.write_text("decisions,aoi,aoi_sem,train/entropy\n0,60,4,\n128,30.5,,nan\n")
+    first, second = read_curve(path)
+    assert first == {"decisions": 0.0, "aoi": 60.0, "aoi_sem": 4.0}
+    assert (second["aoi"], "aoi_sem" in second) == (30.5, False)
+
+
+@pytest.mark.parametrize("text", ["a,b\n1,2\n", "decisions,aoi\n0,x\n", "decisions,aoi\n0,\n"])
+def test_what_is_no_curve_is_refused(tmp_path, text):
+    (tmp_path / "other.csv").write_text(text)
+    with pytest.raises(ValueError, match=r"other\.csv is no learning curve, of decisions and aoi"):
+        read_curve(tmp_path / "other.csv")
+
+
+def test_a_run_with_own_parts_is_read_to_look_at_without_naming_them(tmp_path):
+    own = replace(usual_settings("robot", paper("stationary"), (5,)), features="my:Ages")
+    write_run(tmp_path, TrainingRun(training=own, limits=Limits(decisions=1)))
+    with pytest.raises(ValueError, match="goes on with someone's own my:Ages"):
+        read_run(tmp_path)
+    assert read_run(tmp_path, named=None).training == own

@@ -29,14 +29,12 @@ def test_credit_per_team_is_the_papers():
     assert not network.is_linear
     assert (training.features, network.edges, network.num_outputs) == ("paper", "reference", 1)
     assert not training.shares_trunk
-    assert not training.sums_nodes
 
 
 def test_credit_per_team_under_the_reference_preset_is_the_authors():
     training = usual_settings("team", reference("stationary"), (40,))
     network = training.network
     assert (training.features, network.edges, network.num_outputs) == ("reference", "reference", 2)
-    assert training.sums_nodes
     assert training.silence_logit == 0.0
 
 

@@ -298,5 +298,5 @@ def test_a_run_that_appears_meanwhile_is_not_continued(tmp_path, monkeypatch):
         return owned(path)
 
     monkeypatch.setattr(train, "owned", owned_late)
-    with pytest.raises(ValueError, match="holds a run; go on with it by --resume"):
+    with pytest.raises(ValueError, match=r"holds checkpoint.pt; go on with a run by --resume"):
         run(small_training(), tmp_path)

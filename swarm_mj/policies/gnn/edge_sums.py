@@ -1,4 +1,4 @@
-"""Sums over the edges that end at each node, in one compiled pass (Eqs. 11, 12)."""
+"""Means over the edges that end at each node, in one compiled pass (Eqs. 11, 12)."""
 
 from typing import Any, NamedTuple
 
@@ -20,6 +20,7 @@ class WantedEdges(NamedTuple):
     end: Int[np.ndarray, "e"]  # counted among those nodes
     start: Int[np.ndarray, "e"]  # counted among all nodes
     direction: Int[np.ndarray, "e"]
+    degree: Int[np.ndarray, "w"]  # how many end at each of those nodes
 
 
 @compiled()
@@ -33,6 +34,7 @@ def edges_to(
     max_edges, num, num_wanted = parent.size * len(is_upward), 0, 0
     end, start = np.empty(max_edges, np.int64), np.empty(max_edges, np.int64)
     direction, place = np.empty(max_edges, np.int64), np.empty(num_nodes, np.int64)
+    degree = np.zeros(is_wanted.sum(), np.int64)
     for r in range(num_graphs):
         for k in range(num_nodes):
             place[k] = num_wanted if is_wanted[r, k] else -1
@@ -44,12 +46,13 @@ def edges_to(
                 if place[to] >= 0:
                     end[num], start[num] = place[to], r * num_nodes + other
                     direction[num] = d
+                    degree[place[to]] += 1
                     num += 1
-    return WantedEdges(end[:num], start[:num], direction[:num])
+    return WantedEdges(end[:num], start[:num], direction[:num], degree)
 
 
-class EdgeSums(torch.autograd.Function):
-    """For each wanted node, the sum over its edges of relu(receiver + sender + direction).
+class EdgeMeans(torch.autograd.Function):
+    """For each wanted node, the mean over its edges of relu(receiver + sender + direction).
 
     In one pass: torch would go through memory once for every step of it, and again backwards.
     """
@@ -62,19 +65,20 @@ class EdgeSums(torch.autograd.Function):
         direction: Float[Tensor, "D C"],
         edges: WantedEdges,
     ) -> Float[Tensor, "w C"]:
-        """Return the sums; all tensors are on a CPU."""
+        """Return the means, 0 without edges; all tensors are on a CPU."""
         total = torch.zeros_like(receiver)
         _sum(as_array(receiver), as_array(sender), as_array(direction), edges, total.numpy())
         ctx.save_for_backward(receiver, sender, direction)
-        ctx.edges = edges
-        return total
+        ctx.edges, degree = edges, torch.from_numpy(edges.degree).clamp(min=1)
+        ctx.share = degree.to(total.dtype).reciprocal()[:, None]  # of an edge in its end's mean
+        return total.mul_(ctx.share)
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:  # noqa: ANN401 - torch's own
-        """Return the gradients of the first three arguments, from that of the sums."""
+        """Return the gradients of the first three arguments, from that of the means."""
         given = tuple(map(as_array, ctx.saved_tensors))
         back = tuple(map(np.zeros_like, given))
-        _spread(given, ctx.edges, as_array(gradients[0]), back)
+        _spread(given, ctx.edges, as_array(gradients[0] * ctx.share), back)
         return *map(torch.from_numpy, back), None
 
 

@@ -15,8 +15,8 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor, nn
 
-from swarm_mj.policies.gnn.edge_sums import EdgeSums, as_array, edges_to
-from swarm_mj.policies.gnn.network import AggregationGnn, edges_of, mean_aggregation
+from swarm_mj.policies.gnn.edge_sums import EdgeMeans, as_array, edges_to
+from swarm_mj.policies.gnn.network import AggregationGnn, EdgeSet, edges_of, mean_aggregation
 from swarm_mj.policies.policy_config import GnnShape
 
 NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
@@ -130,48 +130,65 @@ class Composed:
     ) -> Float[Tensor, "R N O"]:
         """Evaluate the network; arguments as in `AggregationGnn.forward`."""
         wanted = is_wanted.flatten().nonzero().squeeze(1)
-        v = hidden(self._encoder[0](node.flatten(0, 1)), self._encoder[1:-1])
-        own = v.index_select(0, wanted)
-        output = self._output_bias + self._decode(0, own)
         if self._is_compiled and node.device.type == "cpu":
-            output = output + self._decode(1, self._only_block(v, own, parent, is_wanted))
+            output = self._one_block(node, wanted, parent, is_wanted)
         else:
             edges = edges_of(parent, self._shape.edges, node.dtype)
-            has_edge = node.new_zeros(parent.numel()).index_fill(0, edges.receiver, 1.0)
-            e = self._encoded_edges.index_select(0, edges.feature.flatten().long())
-            for stage, entries in enumerate(self._stages[:-1], start=1):
-                e = e if stage == 1 else self._edge_again(e)
-                ends = entries.receiver(v).index_select(0, edges.receiver).add_(e)
-                ends = ends.add_(entries.sender(v).index_select(0, edges.sender))
-                e = hidden(ends, self._edge[1:-1])
-                mean = mean_aggregation(e, edges.receiver, len(v))
-                v = self._update_nodes(entries.node(v), mean, has_edge)
-                output = output + self._decode(stage, v.index_select(0, wanted))
+            output = self._all_blocks(node.flatten(0, 1), edges, is_wanted.flatten())
         everyone = output.new_zeros(parent.numel(), output.shape[1])
         return everyone.index_copy(0, wanted, output).view(*parent.shape, output.shape[1])
+
+    def _all_blocks(
+        self, node: Rows, edges: EdgeSet, is_wanted: Bool[Tensor, "n"]
+    ) -> Float[Tensor, "w O"]:
+        """Return the numbers of the wanted nodes; others count only as far as these hear them."""
+        is_needed = is_wanted.clone()
+        for _ in range(self._shape.receptive_field):
+            is_needed[edges.sender[is_needed[edges.receiver]]] = True
+        is_kept = is_needed[edges.receiver] & is_needed[edges.sender]
+        place = is_needed.cumsum(0) - 1
+        receivers, end = place[edges.receiver[is_kept]].unique(return_inverse=True)
+        senders, start = place[edges.sender[is_kept]].unique(return_inverse=True)
+        e = self._encoded_edges.index_select(0, edges.feature[is_kept].flatten().long())
+        wanted = place[is_wanted]
+        v = hidden(self._encoder[0](node[is_needed]), self._encoder[1:-1])
+        output = self._output_bias + self._decode(0, v.index_select(0, wanted))
+        for stage, entries in enumerate(self._stages[:-1], start=1):
+            e = e if stage == 1 else self._edge_again(e)
+            ends = entries.receiver(v.index_select(0, receivers)).index_select(0, end).add_(e)
+            sent = entries.sender(v.index_select(0, senders))
+            e = hidden(ends.add_(sent.index_select(0, start)), self._edge[1:-1])
+            mean = mean_aggregation(e, end, len(receivers))
+            entered = entries.node(v).index_add_(0, receivers, mean @ self._mean.weight.T)
+            entered = entered.index_add_(0, receivers, self._mean.bias.expand_as(mean))
+            v = hidden(entered, self._node[1:-1])
+            output = output + self._decode(stage, v.index_select(0, wanted))
+        return output
 
     def _decode(self, stage: int, node: Rows) -> Float[Tensor, "n O"]:
         decoded = hidden(self._stages[stage].decoder(node), self._decoder[1:-1])
         return self._outputs[stage](decoded)
 
-    def _only_block(
-        self, node: Rows, wanted: Float[Tensor, "w C"], parent: Parents, is_wanted: Asked
-    ) -> Float[Tensor, "w C"]:
-        """Return the wanted nodes after the only block, if its edges have one hidden layer."""
+    def _one_block(
+        self,
+        node: Float[Tensor, "R N F"],
+        wanted: Int[Tensor, "w"],
+        parent: Parents,
+        is_wanted: Asked,
+    ) -> Float[Tensor, "w O"]:
+        """Return the numbers of the wanted nodes if the only block's edges have one layer."""
+        v = hidden(self._encoder[0](node.flatten(0, 1)), self._encoder[1:-1])
         entries = self._stages[0]
+        own = v.index_select(0, wanted)
+        output = self._output_bias + self._decode(0, own)
         edges = edges_to(as_array(parent), np.array(self._is_upward), as_array(is_wanted))
-        total = EdgeSums.apply(
-            entries.receiver(wanted),
-            node @ entries.sender.weight.T,
+        mean = EdgeMeans.apply(
+            entries.receiver(own),
+            v @ entries.sender.weight.T,
             self._encoded_edges + entries.sender.bias,
             edges,
         )
-        degree = torch.from_numpy(np.bincount(edges.end, minlength=len(wanted))).to(node.dtype)
-        mean = total * degree.clamp(min=1).reciprocal()[:, None]
-        return self._update_nodes(entries.node(wanted), mean, degree.sign())
-
-    def _update_nodes(self, entered: Rows, mean: Rows, has_edge: Float[Tensor, "n"]) -> Rows:
-        """NN_v, from its first layer's part for the node and the edges' mean before their last."""
-        entered = entered.addmm_(mean, self._mean.weight.T)
+        has_edge = torch.from_numpy(edges.degree > 0).to(node.dtype)
+        entered = entries.node(own).addmm_(mean, self._mean.weight.T)
         entered = entered.addr_(has_edge, self._mean.bias)  # without edges the mean is 0
-        return hidden(entered, self._node[1:-1])
+        return output + self._decode(1, hidden(entered, self._node[1:-1]))

@@ -70,6 +70,23 @@ def test_the_fast_network_is_the_plain_one(edges, depth, receptive_field, is_lin
         torch.testing.assert_close(found[name], expected[name], rtol=1e-9, atol=1e-11, msg=name)
 
 
+@pytest.mark.parametrize(
+    ("edges", "needed"), [("paper", [1, 2, 3]), ("reference", [0, 1]), ("both", [0, 1, 2, 3])]
+)
+def test_nodes_that_the_wanted_ones_do_not_hear_of_take_no_part(edges, needed):
+    """A chain 5 - 4 - 3 - 2 - 1 - 0, whose children are left: node 1 hears nodes up to two away."""
+    _, fast = plain_and_fast(edges=edges, depth=3, receptive_field=2)
+    node, parent = torch.full((1, 6, 3), torch.nan).double(), torch.arange(-1, 5)[None]
+    node[0, needed] = torch.arange(1.0, 3.0 * len(needed) + 1.0).double().reshape(-1, 3)
+    is_wanted = torch.arange(6)[None] == 1
+    found = outputs_and_gradients(fast, node, parent, is_wanted)
+    assert found["output"][0, 1].isfinite().all()
+    for name, gradient in found.items():
+        assert gradient.isfinite().all(), name
+    assert torch.any(found["node"][0, needed[-1]] != 0.0)
+    assert torch.any(found["node"][0, needed[0]] != 0.0)
+
+
 @pytest.mark.parametrize("edges", DIRECTIONS)
 def test_float32_rounds_little(edges):
     plain, fast = plain_and_fast(torch.float, edges=edges, latent=32, receptive_field=5)
