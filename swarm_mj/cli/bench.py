@@ -1,20 +1,29 @@
 """`swarm-mj bench`: how fast the simulation and its parts are on this machine."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 from rich.console import Console
 from rich.table import Table
 
 from swarm_mj.cli.bench_simulation import (
+    GROWING,
+    NUM_FITTED,
     Row,
+    draw_teams,
     evaluation_rows,
+    growth,
     plain_step_us,
     simulation_rows,
+    team_rows,
     world_rows,
 )
+from swarm_mj.cli.options import output_option
 from swarm_mj.system.fields import setting
+from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import plain_console, tell_cores
+from swarm_mj.system.writing import Output, check_outputs
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 BUSY = 0.3  # the spread from which on numbers say little
@@ -23,7 +32,9 @@ window: 100 ms of a mission. The indented rows below the line are its parts.
 plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
 arena blocks: costs most in MuJoCo, which looks for contacts in each of its ten steps a window.
 planner: most of its time goes into plans, once in half as many windows as there are robots.
-team decision: the network decides for all robots of a team, in one window."""
+team decision: the network decides for all robots of a team, in one window.
+process: its largest memory. team: its memory beyond that of a team of three robots, and below it
+what `fly` estimates."""
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -41,15 +52,25 @@ class BenchOptions:
     )
     jobs: int = setting(2, "processes of that evaluation", low=1, high=256)
     no_learning: bool = setting(False, "leave out the networks and the training")
+    robots: tuple[int, ...] = setting(
+        (), "measure teams of these sizes instead", low=2, high=10_000, shown="none"
+    )
+    plot: Path | None = output_option(None, "draw these teams", metavar="FILE.png|.svg|.pdf")
 
 
 def run(options: BenchOptions) -> int:
     """Run the command; return its exit code."""
+    if options.plot:
+        need("matplotlib", "a chart")
+    check_outputs(Output("--plot", options.plot, ".png|.svg|.pdf"))
+    if options.plot or options.robots:
+        _check_teams(set(options.robots))
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
     tables, steps_us = [], [plain_step_us(options.seconds / 4)]
     with Console(stderr=True).status("Measuring ...") as status:
-        for table in _tables(options, status.update):
+        tables_of = _team_tables if options.robots or options.plot else _tables
+        for table in tables_of(options, status.update):
             tables.append(table)
             steps_us.append(plain_step_us(options.seconds / 4))
     Console(highlight=False).print(*tables, sep="\n")
@@ -66,6 +87,29 @@ def noise(steps_us: Sequence[float]) -> str:
         f"noise: the plain step was measured {len(steps_us)} times, from {least:.2f} to {most:.2f} "
         f"µs. Other numbers, too, may be off by {spread:.0%}{busy}."
     )
+
+
+def _check_teams(teams: Collection[object]) -> None:
+    if len(teams) < 2:
+        raise ValueError("growth needs two teams or more that fit, such as --robots 300 1000 3000")
+
+
+def _team_tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:
+    """Measure teams, the smallest first; print which are left out, and why."""
+    teams = {}
+    for num_robots in sorted(set(options.robots)):
+        say(f"Measuring {num_robots} robots ...")
+        try:
+            teams[str(num_robots)] = list(team_rows(num_robots, options.seconds))
+        except ValueError as error:
+            plain_console(is_error=True).print(f"{num_robots} robots are left out: {error}")
+    _check_teams(teams)
+    powers = " and ".join(f"{name}: N^{growth(teams, name)[0]:.2f}" for name in GROWING)
+    yield _table(
+        f"Growth of the {min(NUM_FITTED, len(teams))} largest teams: {powers}", teams, head="robots"
+    )
+    if options.plot:
+        draw_teams(teams, options.plot)
 
 
 def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:

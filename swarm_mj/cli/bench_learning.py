@@ -7,6 +7,7 @@ import numpy as np
 import torch
 
 from swarm_mj.cli.bench_simulation import Row, microseconds
+from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import Mission, paper
@@ -27,6 +28,8 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
     mission = paper("stationary", num_robots=num_robots)
     for num_missions in (1, 32):
         yield from _network_rows(mission, num_missions, seconds)
+    ratio = _environment_windows(mission, 32, seconds)
+    yield Row("a step of make_vec, 32 missions, default features, in windows", ratio, "{:.2f}")
     for credit in ("robot", "team"):
         per_s = _training_per_s(credit, mission, threads, seconds)
         yield Row(f"train --credit {credit}: team decisions", per_s, "{:.1f} / s")
@@ -37,6 +40,16 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
         decide = _forward(FastAggregationGnn(shape), node[:1], parent[:1])
         decision_us = microseconds(decide, seconds / 2)
         yield Row(f"one robot's decision, network of {name}", decision_us, "{:.0f} µs")
+
+
+def _environment_windows(mission: Mission, num_missions: int, seconds: float) -> float:
+    """Return a step of the environment over a window of its missions that a `Swarm` flies alone."""
+    swarm, env = Swarm(mission, range(num_missions)), SwarmVectorEnv(num_missions, mission)
+    swarm.start(RoundRobin())
+    env.reset(seed=list(range(num_missions)))
+    window_us = microseconds(swarm.step, seconds / 2)
+    both_us = microseconds(lambda: (swarm.step(), env.step(swarm.phases[0].recipient)), seconds)
+    return both_us / window_us - 1.0
 
 
 def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterator[Row]:

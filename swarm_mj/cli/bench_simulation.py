@@ -3,17 +3,20 @@
 The yardstick is a plain mj_step in the same run. A measurement takes about `seconds`.
 """
 
+import json
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from pathlib import Path
 from timeit import repeat, timeit
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 from mujoco._functions import mj_step  # private: type checkers see it only there
 from mujoco._structs import MjData
 
+from swarm_mj.api.fly import compile_ahead, flight_needs
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.flying import run_jobs
 from swarm_mj.evaluation.published import BASELINES
@@ -25,6 +28,9 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import channel_at, window
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.needs import FLYING, check_fits, peak_memory
+from swarm_mj.system.packages import commit, version
+from swarm_mj.system.processes import attempt
 
 ORACLE_EPISODES = 4  # at most: it takes its time
 REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
@@ -36,6 +42,11 @@ PLANNED = {  # missions by what is said of them
 }
 PLAIN_STEP = "one plain MuJoCo step of 40 robots"
 IN_STEPS = "  in plain MuJoCo steps"
+TEAMS_FLY = "random-flooding"  # a draw for each robot, so the simulation is what is measured
+GROWING = ("window, ms", "team, MB")  # of teams; these are drawn
+NUM_FITTED = 3  # of the largest teams: in small ones most of both does not grow
+LONGEST_S = 1800.0  # of a team's process
+MB = 1e6
 
 
 class Row(NamedTuple):
@@ -156,6 +167,68 @@ def _planned_window_us(mission: Mission, seconds: float) -> float:
             swarm.step(planner)
 
     return microseconds(two_epochs, seconds) / mission.num_robots
+
+
+def team_rows(num_robots: int, seconds: float) -> Iterator[Row]:
+    """Measure a team in a process of its own, because peaks of memory would mix.
+
+    Raise ValueError if it does not fit, or fails.
+    """
+    mission = replace(MISSION, num_robots=num_robots)
+    needs = flight_needs(mission, TEAMS_FLY, is_recorded=False)
+    check_fits(needs, None, "choose fewer --robots", is_forced=False, way_on="")
+    program = f"from {__name__} import measure; measure({num_robots}, {seconds})"
+    works, said = attempt(program, longest_s=LONGEST_S)
+    if not works:
+        raise ValueError(said)
+    for name, value in json.loads(said).items():
+        yield Row(name, value, "{:,.1f}" if value > 10.0 else "{:.3f}")
+    yield Row("  estimated", (needs.memory - FLYING) / MB, "{:,.1f}")
+
+
+def measure(num_robots: int, seconds: float) -> None:
+    """Fly a team in this process, and print what it takes as JSON."""
+    mission = replace(MISSION, num_robots=num_robots)
+    compile_ahead(mission, TEAMS_FLY)
+    before, policy = peak_memory(), make_policy(TEAMS_FLY, mission)
+    begun_s, swarm = time.perf_counter(), Swarm(mission, [0])
+    start_s = time.perf_counter() - begun_s
+    window_us = microseconds(lambda: swarm.step(policy), seconds)
+    peak = peak_memory()
+    values = {"start, s": start_s, "window, ms": window_us / 1e3, "process, MB": peak / MB}
+    print(json.dumps({**values, "team, MB": (peak - before) / MB}))  # noqa: T201
+
+
+def growth(teams: Mapping[str, Sequence[Row]], name: str) -> tuple[float, float]:
+    """Return p and c of c N^p, the least squares in logarithms of a row over the largest teams."""
+    numbers, values = np.log(_values(teams, name)[:, -NUM_FITTED:])
+    power, constant = np.polyfit(numbers, values, 1)
+    return float(power), float(np.exp(constant))
+
+
+def _values(teams: Mapping[str, Sequence[Row]], name: str) -> Float[np.ndarray, "2 T"]:
+    """Return the sizes of teams, and their values in a row."""
+    return np.array([(int(n), row.value) for n in teams for row in teams[n] if row.name == name]).T
+
+
+def draw_teams(teams: Mapping[str, Sequence[Row]], path: Path) -> None:
+    """Write a chart of what grows with the team, and of the fits."""
+    from matplotlib.figure import Figure  # slow to import
+
+    from swarm_mj.evaluation.figures.style import code, look_of, save, styled, write_caption
+
+    look = look_of(TEAMS_FLY)
+    with styled():
+        figure = Figure(figsize=(7.5, 3.0), layout="constrained")
+        for axes, name in zip(figure.subplots(1, 2), GROWING, strict=True):
+            (numbers, values), (power, factor) = _values(teams, name), growth(teams, name)
+            fitted = numbers[-NUM_FITTED:]
+            axes.loglog(fitted, factor * fitted**power, color=look.colour)
+            axes.loglog(numbers, values, look.marker, color=look.colour)
+            axes.set(xlabel="robots", title=f"{name}: grows with $N^{{{power:.2f}}}$")
+        said = f"random walk, {look.label}; lines: fits of the {NUM_FITTED} largest teams"
+        write_caption(figure, f"{said}; {code(version(), commit())}")
+    save(figure, path)
 
 
 def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], object]:

@@ -2,7 +2,7 @@
 
 import pytest
 
-from swarm_mj.cli import bench_learning, main
+from swarm_mj.cli import bench, bench_learning, main
 from swarm_mj.cli.bench import noise
 from swarm_mj.cli.bench_simulation import Row
 
@@ -35,3 +35,38 @@ def test_noise_is_the_spread_of_what_should_be_the_same():
     )
     assert noise([4.0, 4.4]).endswith("10%.")
     assert noise([4.0, 6.0]).endswith("50%; the machine was busy, so measure again when it is not.")
+
+
+@pytest.fixture
+def teams(monkeypatch, here):
+    """Teams that grow by known powers from 100 robots on; 400 robots do not fit."""
+
+    def rows(num_robots, _):
+        if num_robots == 400:
+            raise ValueError("too large")
+        small = 5.0 if num_robots < 100 else 0.0
+        yield Row("window, ms", small + 2.0 * num_robots**1.5, "{:,.1f}")
+        yield Row("team, MB", small + 3.0 * num_robots**2.0, "{:,.1f}")
+
+    monkeypatch.setattr(bench, "team_rows", rows)
+    return here
+
+
+def test_teams_of_several_sizes_show_their_growth(teams, capsys):
+    sizes = ("400", "10", "200", "100", "300")
+    chart = ("--plot", "growth.png", "--seconds", "0.1")
+    assert main(["bench", "--robots", *sizes, *chart]) == 0
+    printed = capsys.readouterr()
+    said = " ".join(printed.out.split())
+    assert "the 3 largest teams: window, ms: N^1.50 and team, MB: N^2.00" in said
+    assert "robots ┃ 10 ┃ 100 ┃ 200 ┃ 300" in said
+    assert "400 robots are left out: too large" in printed.err
+    assert "Evaluation" not in said
+    assert [path.name for path in teams.iterdir()] == ["growth.png"]
+
+
+@pytest.mark.parametrize("line", [("--plot", "a.svg"), ("--robots", "10", "400")])
+def test_one_team_shows_no_growth(teams, capsys, line):
+    assert main(["bench", *line, "--seconds", "0.1"]) == 2
+    assert "growth needs two teams or more that fit" in capsys.readouterr().err
+    assert not list(teams.iterdir())

@@ -6,15 +6,19 @@ import pytest
 from swarm_mj.cli.bench_simulation import (
     IN_STEPS,
     PLAIN_STEP,
+    Row,
     evaluation_rows,
+    growth,
     simulation_rows,
     talking,
+    team_rows,
     world_rows,
 )
 from swarm_mj.mission import paper
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system import needs
 
 
 def test_a_timing_is_consistent():
@@ -56,3 +60,26 @@ def test_what_is_timed_leaves_no_entries_from_the_future():
         talk()
         assert np.all(swarm.now == np.diagonal(swarm.buffers.timestamp, axis1=1, axis2=2).T)
         mean_hops(swarm.buffers)  # raises where parents form a circle
+
+
+def test_a_team_is_measured_in_a_process_of_its_own():
+    """Its tables of 600 robots take 19 MB, whatever this process has held."""
+    assert needs.peak_memory() > 1e6
+    rows = {row.name: row.value for row in team_rows(600, 0.1)}
+    assert min(rows.values()) > 0.0
+    assert 52e-6 * 600**2 < rows["team, MB"] < 3.0 * 52e-6 * 600**2
+    assert rows["  estimated"] == pytest.approx(57e-6 * 600**2 + 8.5e-3 * 600)
+    assert rows["process, MB"] > 50.0 + rows["team, MB"]
+
+
+def test_a_team_that_does_not_fit_is_refused(monkeypatch):
+    monkeypatch.setattr(needs, "free_memory", lambda: 1e9)
+    with pytest.raises(ValueError, match=r"5.86 GB of memory, and 1 GB are free; choose fewer"):
+        next(team_rows(10_000, 0.1))
+
+
+def test_growth_is_that_of_the_three_largest_teams():
+    teams = {str(n): [Row("a", 1.0), Row("b", 0.5 * n**1.5)] for n in (8, 16, 32)}
+    teams = {"2": [Row("a", 9.0), Row("b", 9.0)], **teams}
+    assert growth(teams, "b") == pytest.approx((1.5, 0.5))
+    assert growth(teams, "a") == pytest.approx((0.0, 1.0))

@@ -7,12 +7,7 @@ from pathlib import Path
 
 import swarm_mj.learning.train  # noqa: F401 - the estimate counts it with torch, which is loaded
 from swarm_mj.cli import main
-
-
-def resident(name):
-    """What this process holds now (`VmRSS`), or held at the most (`VmHWM`) [bytes]."""
-    status = Path("/proc/self/status").read_text()
-    return 1024 * int(status.partition(f"{name}:")[2].split()[0])
+from swarm_mj.system.needs import peak_memory
 
 
 def peak_of(arguments):
@@ -25,9 +20,9 @@ def peak_of(arguments):
     for name in ("fly", "evaluate", "train"):
         sys.modules[f"swarm_mj.cli.{name}"].check_fits = keep
     Path("/proc/self/clear_refs").write_text("5")  # the peak starts anew
-    before = resident("VmRSS")
+    before = peak_memory()
     assert main(arguments) == 0, arguments
-    return estimated[0].memory, resident("VmHWM") - before, estimated[0].file
+    return estimated[0].memory, peak_memory() - before, estimated[0].file
 
 
 if __name__ == "__main__":

@@ -260,27 +260,10 @@ def test_a_pipe_is_not_waited_for(begun, capsys, name):
     refused(begun, capsys, "pipe")
 
 
-def _step(state):
-    state["adam"][0]["step"].fill_(-1.0)
-
-
-def _weights(state):
-    next(iter(state["weights"].values())).fill_(float("nan"))
-
-
 CRAFTED_STATES = [
-    _step,
-    _weights,
     lambda s: s.clear(),
     lambda s: s.update(weights={}, adam={}),
-    lambda s: s["adam"][0].update(exp_avg=torch.zeros(3)),
-    lambda s: s["adam"][0].update(exp_avg=torch.zeros(6, 18).to_sparse()),
-    lambda s: s["adam"].pop(3),
     lambda s: s["candidates"].popitem(),
-    lambda s: s["candidates"][64]["output.bias"].fill_(float("inf")),
-    lambda s: s.update(normaliser={"mean": torch.zeros(())}),
-    lambda s: s.update(episode_starts=torch.zeros(3)),
-    lambda s: s["last_windows"].__setitem__(0, 10**9),
     lambda s: s["last_windows"].__setitem__(3, 1),
     lambda s: s["last_windows"].pop(),
     lambda s: s["seeds"].__setitem__(0, [-1]),
@@ -288,7 +271,6 @@ CRAFTED_STATES = [
     lambda s: s["recipients"][3].fill_(99),
     lambda s: s["recipients"].update({3: torch.zeros(1).expand(10**9)}),
     lambda s: s.update(torch_rng=torch.zeros(5056, dtype=torch.uint8)),
-    lambda s: s["numpy_rng"].__setitem__(2, 10**6),
     lambda s: s["numpy_rng"][1].pop(),
     lambda s: s["seeds_rng"]["state"].update(state=-1),
     lambda s: s["seeds_rng"].update(bit_generator="MT19937"),
@@ -296,11 +278,7 @@ CRAFTED_STATES = [
     lambda s: s["progress"].update(curve=[{}]),
     lambda s: s["progress"].update(next_replay=None),
     lambda s: s["progress"].update(wings=2),
-    lambda s: s["progress"].update(decisions=60),
-    lambda s: s["progress"]["choice"].update(num_missions=-1),
-    lambda s: s["progress"]["curve"][0].update(aoi=float("inf")),
     lambda s: s["progress"]["curve"][0].update(aoi="1"),
-    lambda s: s["progress"]["since_evaluation"].update(seconds=float("nan")),
     lambda s: s["progress"].update(optimiser={"train/entropy": "high"}),
 ]
 

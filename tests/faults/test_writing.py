@@ -102,7 +102,7 @@ def test_a_flight_whose_replay_finds_no_place_says_so(here, capsys):
 
 
 EVALUATE = ["evaluate", *SMALL, "--policy", "tdma", "--episodes", "2"]
-FIGURE = ["figures", WALK, "--figure", "fig5", "--out", ".", "--yes", "--format"]
+FIGURE = ["figures", WALK, "--figure", "fig5", "--out", ".", "--format"]
 # What writes a kind of file, whatever is estimated, and the file.
 WRITTEN = {
     "replay": (["fly", *SMALL, "--record", "a.rrd", "--yes"], "a.rrd"),

@@ -34,6 +34,13 @@ def refusal(its_needs, output=None):
     return str(refused.value)
 
 
+def test_a_peak_outlasts_what_was_held():
+    before = needs.peak_memory()
+    assert before >= 0.9 * psutil.Process().memory_info().rss
+    bytearray(b"1") * int(before)
+    assert needs.peak_memory() > 1.5 * before
+
+
 def test_what_fits_passes(machine, tmp_path):
     check_fits(Needs(memory=8e9, file=2e9), tmp_path, "", is_forced=False)
     check_fits(Needs(memory=1e9, file=1e12), None, "", is_forced=False)
