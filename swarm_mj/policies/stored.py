@@ -30,7 +30,6 @@ POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
 FORMAT, VERSION = "swarm_mj policy", 2  # and the metadata's entry; version 1 was a folder
 CONFIGS = {"gnn": GnnConfig, "mlp": MlpConfig}
 MAX_BYTES = 64_000_000
-MAX_SHOWN = 8  # policies in a message
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
 
@@ -44,9 +43,7 @@ class _Metadata:
 def save_gnn(
     path: Path, network: "AggregationGnn", config: GnnConfig, card: str | None = None
 ) -> Path:
-    """Store a GNN; as `save_weights`, and ValueError if the config is of another network."""
-    if config.network != network.shape:
-        raise ValueError(f"config describes {config.network}, but the network is {network.shape}")
+    """Store a GNN, as `save_weights` does."""
     weights = {name: t.detach().cpu().numpy() for name, t in network.state_dict().items()}
     return save_weights(path, weights, config, card)
 
@@ -57,18 +54,15 @@ def save_weights(
     """Store a policy, whole or not at all; return its file, which replaces one of that name.
 
     `.safetensors` is appended unless the path ends so. The card, in Markdown, is `model_card` of
-    the config unless given. Raises ValueError if `load_policy` would not take it, OSError if the
-    file cannot be written.
+    the config unless given. Raises ValueError for weights that `load_policy` would not take, or a
+    file too large, TypeError or ValueError for a config that is no JSON, OSError if the file cannot
+    be written.
     """
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
     _check_tensors(config, path, weights)
     (kind,) = (name for name, its in CONFIGS.items() if isinstance(config, its))
     said = {"format": FORMAT, "format_version": VERSION, "kind": kind, "config": asdict(config)}
-    try:
-        text = json.dumps(said | {"card": card or model_card(config)}, allow_nan=False)
-    except (TypeError, ValueError, RecursionError) as error:
-        raise ValueError(f"config must be JSON all through: {error}") from error
-    _config_of(text)
+    text = json.dumps(said | {"card": card or model_card(config)}, allow_nan=False)
     # In one entry: safetensors would write several in another order every time.
     data = save({n: np.ascontiguousarray(w) for n, w in weights.items()}, {FORMAT: text})
     check_size(path.name, len(data), MAX_BYTES)
@@ -135,7 +129,8 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
         weights, metadata = _read_tensors(place)
         if FORMAT not in metadata:
             raise ValueError("it has weights, but does not say of which policy")
-        config = _config_of(metadata[FORMAT])
+        said = read_document(metadata[FORMAT], FORMAT, VERSION, _Metadata)
+        config = read_plain(said.config, CONFIGS[said.kind])
         _check_tensors(config, path, weights)
     except ValueError as error:
         raise ValueError(f"policy {place}: {error}; {WAY_OUT}") from error
@@ -150,17 +145,9 @@ def find_policy(path: Path) -> Path:
     for place in (path, Path(f"{path}{SUFFIX}"), path / POLICY):
         if os.path.isfile(place):
             return place
-    for folder in (path, path / "policy"):
-        if os.path.isfile(folder / "config.json"):
-            raise ValueError(
-                f"policy {folder} is a folder, as swarm_mj 0.1 stored policies, which is no longer "
-                "read; train it again with `swarm-mj train`"
-            )
     found = sorted({*path.glob(f"*{SUFFIX}"), *path.glob(f"*/{POLICY}")})
     if found:
-        more = f" and {len(found) - MAX_SHOWN} more" if len(found) > MAX_SHOWN else ""
-        shown = ", ".join(map(str, found[:MAX_SHOWN]))
-        raise ValueError(f"{path} holds policies; name one of them: {shown}{more}")
+        raise ValueError(f"{path} holds policies; name one of them: {', '.join(map(str, found))}")
     raise ValueError(
         f"there is no policy {path}; name a {SUFFIX} file, or the folder of a run that "
         "`swarm-mj train` wrote, such as runs/NAME"
@@ -177,11 +164,6 @@ def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
     # The last two: no type of NumPy's.
     except (SafetensorError, AttributeError, TypeError) as error:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
-
-
-def _config_of(text: str) -> GnnConfig | MlpConfig:
-    said = read_document(text, FORMAT, VERSION, _Metadata)
-    return read_plain(said.config, CONFIGS[said.kind])
 
 
 def _check_tensors(config: GnnConfig | MlpConfig, path: Path, tensors: Weights) -> None:

@@ -1,21 +1,30 @@
 """Time-division multiple access: one robot broadcasts after the other, or several far apart.
 
-For the second see Nelson and Kleinrock 1985; by interference, Grönkvist and Hansson 2001.
+For the second see Nelson and Kleinrock 1985; by interference, Grönkvist and Hansson 2001. Robots
+that do not know everyone yet share slots by node activation (NAMA: Bao, Garcia-Luna-Aceves 2001).
 """
 
+import math
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.policy import BroadcastPolicy
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import PowerLaw, no_powers
 from swarm_mj.radio.spatial_reuse import keep_joined
+from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
+
+CONTENTION_RANGES = 1.4  # robots nearer than this contend; tuned for 80 to 1000 walkers
+MIN_CROWDS = 8.0  # of robots in reach, below which teams do better by turns
 
 
 class Tdma(BroadcastPolicy):
@@ -44,16 +53,23 @@ class SpatialTdma(Tdma):
 
     Who joins the owner of the turn is the rule of `radio.spatial_reuse`: each robot predicts from
     its own buffer, alone, which packets its teammates would decode, and robots that believe the
-    same decide the same. Until a robot has heard of everyone it transmits in its own turn only: so
-    the team begins as `Tdma` does, and no robot that joins overlooks a listener of the owner's.
+    same decide the same. Until a robot has heard of everyone it transmits in its own turn only.
+    Large teams' rounds are too long for that: there such robots also send where they win by node
+    activation. There is one difference: common random numbers are weighted by a robot's news.
     """
 
-    uses = "as tdma, and the positions in its buffer: robots far enough apart share a slot"
+    uses = (
+        "as tdma, and the positions in its buffer, T and whom it hears: robots far apart "
+        "share a slot; in large teams, those nearby with most news"
+    )
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
         self._range_m, self._threshold = mission.range_m, from_db(mission.sinr_threshold_db)
         self._law: PowerLaw | None = None  # of mean powers [noise]
+        share = math.pi * (CONTENTION_RANGES * self._range_m) ** 2 / mission.side_m**2
+        self._num_expected = mission.num_robots * share  # robots in reach, oneself too
+        self._contends = share <= 1.0 / MIN_CROWDS
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""
@@ -64,20 +80,39 @@ class SpatialTdma(Tdma):
         """Draw every mission's order, and forget powers; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
         self._powers = None if self._law is None else no_powers(self._law, len(rngs))
+        self._draws = Stream(rngs, uniform, (2, num_robots))  # common to all robots
+        if self._contends:
+            self._news = np.zeros((len(rngs), num_robots, num_robots), dtype=np.float32)
+            self._noted_at = np.zeros_like(self._news)
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return each robot whose turn it is or that may join."""
+        buffers, slot = views.buffers, slot_of(views.now)
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
-        is_sending = np.all(views.buffers.is_known | is_oneself, axis=2)
+        knows_all = np.all(buffers.is_known | is_oneself, axis=2)
+        is_sending = knows_all.copy()
         keep_joined(
-            views.buffers.position_m,
+            buffers.position_m,
             self._order,
-            slot_of(views.now),
+            slot,
             self._range_m,
             self._threshold,
             is_sending,
             self._powers,
         )
+        if self._contends:
+            wins = winners(
+                buffers.timestamp,
+                buffers.position_m,
+                views.phases[-1].heard if views.phases else views.silence,
+                self._draws.next(),
+                self._range_m,
+                self._num_expected,
+                self._noted_at,
+                self._news,
+            )
+            is_sending |= wins & ~knows_all
+            self._news[is_sending[:, :, None] & is_oneself] = 0.0
         return is_sending
 
 
@@ -89,3 +124,46 @@ def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.n
 def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
     """Return the slot that begins now, counted from 0 at the mission's start."""
     return np.rint(now / SLOT_WINDOWS).astype(np.int64)
+
+
+@compiled()
+def winners(
+    timestamp: Float[np.ndarray, "B N N"],
+    believed_m: Float[np.ndarray, "B N N 2"],
+    heard: Int[np.ndarray, "B N"],
+    draw: Float[np.ndarray, "B 2 N"],
+    range_m: float,
+    num_expected: float,
+    noted_at: Float32[np.ndarray, "B N N"],
+    news: Float32[np.ndarray, "B N N"],
+) -> Bool[np.ndarray, "B N"]:
+    """Return who wins by its own beliefs, and bring `news` from T as noted to the present T.
+
+    Entry [b, i, k] of news is the rise of k's T, summed, since its last packet, as i estimates it
+    [windows]: k learned what i did if i believes it in range of the sender that i decoded. The
+    highest ln(u) / w wins (Efraimidis, Spirakis 2006), the rarer the fewer of those expected in
+    reach are known.
+    """
+    wins = np.zeros(heard.shape, dtype=np.bool_)
+    priority = np.empty(heard.shape[1])
+    for b in range(heard.shape[0]):
+        for i in range(heard.shape[1]):
+            rise = timestamp[b, i] - noted_at[b, i]
+            learned, sender, num_near, best = rise.sum() - rise[i], heard[b, i], 1, -np.inf
+            for k in range(heard.shape[1]):
+                silence = timestamp[b, i, i] - timestamp[b, i, k]
+                has_sent = k != i and rise[k] > 0.0
+                news[b, i, k] = silence if has_sent else news[b, i, k] + rise[i]
+                from_sender_m2 = squared_distance(believed_m[b, i], sender, k)
+                if k != sender and (k == i or from_sender_m2 <= range_m**2):
+                    news[b, i, k] += learned
+                priority[k] = math.log(draw[b, 0, k]) / (news[b, i, k] + SLOT_WINDOWS) ** 3
+                # Who was silent for a round of turns has failed, or is elsewhere.
+                is_heard = timestamp[b, i, k] > NEVER and silence < len(priority) * SLOT_WINDOWS
+                is_known = k != i and is_heard
+                apart_m2 = squared_distance(believed_m[b, i], i, k)
+                if is_known and apart_m2 <= (CONTENTION_RANGES * range_m) ** 2:
+                    num_near, best = num_near + 1, max(best, priority[k])
+            wins[b, i] = priority[i] > best and num_expected * draw[b, 1, i] < num_near
+            noted_at[b, i] = timestamp[b, i]
+    return wins

@@ -8,8 +8,9 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+import msgspec
+
 from swarm_mj.mission import WORLDS, Mission
-from swarm_mj.system.fields import check, same_as, setting
 from swarm_mj.system.reading import read_rows
 
 TABLE = Path(__file__).with_name("tuned.csv")
@@ -21,21 +22,18 @@ class Tuned:
     """The best probability of a policy in one regime: a row of the table, its columns in order."""
 
     policy: str  # a name among `POLICIES`
-    preset: str = same_as(Mission, "preset")
-    task: str = same_as(Mission, "task")
-    num_robots: int = same_as(Mission, "num_robots")
-    range_ratio: float = same_as(Mission, "range_ratio")  # of 1 km
-    velocity_ratio: float = same_as(Mission, "velocity_ratio")  # means nothing to a team at rest
-    probability: float = setting(low=0.0, high=1.0)  # the least mean age of a grid's
-    aoi_mean: float = setting(low=0.0, high=1e9)  # with it, over the episodes (Eq. 10) [windows]
-    aoi_sem: float = setting(low=0.0, high=1e9)  # standard error of that mean [windows]
+    preset: str
+    task: str
+    num_robots: int
+    range_ratio: float  # of 1 km
+    velocity_ratio: float  # means nothing to a team at rest
+    probability: float  # the least mean age of a grid's
+    aoi_mean: float  # with it, over the episodes (Eq. 10) [windows]
+    aoi_sem: float  # standard error of that mean [windows]
     episodes: int  # missions flown with every probability of the grid
     first_seed: int  # of these, the others follow one by one
     version: str  # of the code that tuned it
     commit: str
-
-    def __post_init__(self) -> None:
-        check(self)
 
 
 def tuned_probability(policy_name: str, mission: Mission) -> float:
@@ -64,18 +62,9 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
 
 
 def read_table(path: Path) -> list[Tuned]:
-    """Return the rows of a table; ValueError if it is no such table, or a value is none."""
-    names, rows = read_rows(path, "table", MAX_BYTES)
-    kinds = Tuned.__annotations__
-    if names != list(kinds):
-        raise ValueError(f"columns of {path} must be {', '.join(kinds)}")
-    tuned = []
-    for line, row in rows:
-        try:
-            tuned.append(Tuned(**{name: kind(row[name]) for name, kind in kinds.items()}))
-        except ValueError as error:
-            raise ValueError(f"table {path}, line {line}: {error}") from error
-    return tuned
+    """Return the rows of a table; ValueError if it is no such table."""
+    _, rows = read_rows(path, "table", MAX_BYTES)
+    return msgspec.convert([row for _, row in rows], list[Tuned], strict=False)
 
 
 @cache

@@ -292,7 +292,7 @@ class Flight(BroadcastPolicy):
 
     @property
     def team(self):
-        return self.policy._teams[0]
+        return self.policy.teams[0]
 
     def start(self, num_robots, rngs):
         self.policy.start(num_robots, rngs)

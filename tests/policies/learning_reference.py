@@ -39,7 +39,8 @@ def learner(mission, settings=SHORT):
 
 def rounded(field, values):
     """Numbers as they arrive in a field of a packet."""
-    return field.low + field.step * field.codes(values)
+    codes = np.rint((values - field.low) / field.step)
+    return field.low + field.step * np.clip(codes, 0, 2**field.bits - 1)
 
 
 class Told(NamedTuple):

@@ -1,7 +1,5 @@
 """Policies by their names, and directories in their place."""
 
-import os
-
 import pytest
 from tiny_policies import save_tiny
 
@@ -18,7 +16,6 @@ from swarm_mj.policies.registry import (
     flown_name,
     is_learned,
     make_policy,
-    normalised,
     with_payload,
 )
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
@@ -43,21 +40,11 @@ def folder(tmp_path, monkeypatch):
 
 @here
 @pytest.mark.parametrize(
-    ("typed", "plain"),
-    [
-        ("runs/x/policy", "runs/x/policy"),
-        ("./runs//x/policy/", "runs/x/policy"),
-        ("runs/../mine", "mine"),
-        ("mine/", "mine"),
-        ("mst/", "./mst"),
-        ("./mst", "./mst"),
-        ("all", "all"),
-        ("./one.safetensors", "one.safetensors"),
-    ],
+    "typed",
+    ["runs/x/policy", "./runs//x/policy/", "runs/../mine", "mine/", "mst/", "./mst", "all"],
 )
-def test_a_folder_or_a_file_is_a_learned_policy_by_any_of_its_names(tmp_path, typed, plain):
-    assert normalised(typed) == plain.replace("/", os.sep)
-    for name in (typed, plain, str(tmp_path / typed)):
+def test_a_folder_or_a_file_is_a_learned_policy_by_any_of_its_names(tmp_path, typed):
+    for name in (typed, str(tmp_path / typed)):
         assert is_learned(name)
         assert isinstance(make_policy(name, MISSION), LearnedPolicy)
 
@@ -65,8 +52,6 @@ def test_a_folder_or_a_file_is_a_learned_policy_by_any_of_its_names(tmp_path, ty
 @here
 def test_a_name_is_a_name_whatever_lies_about():
     assert make_policy("mst", MISSION).parameters["probability"] > 0.0
-    assert [normalised(name) for name in (*POLICIES, "rumour", "")] == [*POLICIES, "rumour", ""]
-    assert normalised("gone/") == os.path.join(os.curdir, "gone")
 
 
 @here
@@ -111,8 +96,6 @@ def test_ii_b_the_planner_can_go_without_payload():
     assert with_payload(["tdma"], "snapshots") == ["tdma"]
     with pytest.raises(ValueError, match="but not those of tdma, mst; leave it out"):
         with_payload(["tdma", "mst"], "none")
-    with pytest.raises(ValueError, match="payload must be one of snapshots, none, not 'all'"):
-        with_payload(["planner"], "all")
 
 
 KINDS = {

@@ -1,5 +1,6 @@
 """One broadcast after the other, or several far apart: the orders, the rule by hand, the law."""
 
+import copy
 import math
 from dataclasses import replace
 
@@ -13,7 +14,7 @@ from spatial_rule import agreed_senders
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.policies.tdma import SpatialTdma, Tdma
+from swarm_mj.policies.tdma import SpatialTdma, Tdma, winners
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews
@@ -174,3 +175,125 @@ def test_a_team_at_rest_loses_nothing_and_gains_by_joining(seed):
             assert np.all(phase.heard[0, is_near[owner]] == owner)
         assert np.all(swarms[0].buffers.timestamp >= swarms[1].buffers.timestamp)
     assert np.any(swarms[0].buffers.timestamp > swarms[1].buffers.timestamp)
+
+
+# Contention in large teams.
+
+LARGE = paper("random-walk", num_robots=130)
+
+
+def contend(believed_m, timestamp, draw, noted_at=None, news=None, heard=None, num_expected=0.0):
+    """Who wins in one mission with a range of 250 m, hence a reach of 350 m; news is written."""
+    num_robots = len(timestamp)
+    noted_at = timestamp if noted_at is None else noted_at
+    news = np.zeros_like(timestamp) if news is None else news
+    news = news.astype(np.float32)[None]
+    heard = np.arange(num_robots) if heard is None else heard
+    noted_at = noted_at.astype(np.float32)[None]
+    args = believed_m[None], heard[None], draw[None], 250.0, num_expected, noted_at, news
+    return winners(timestamp[None], *args)[0], news[0]
+
+
+def test_news_by_hand():
+    """Robot 0 decodes robot 1, which had heard robot 2: T rises by 1 + 2 of others, 0.5 of itself.
+
+    Robot 3 is in range of robot 1, so it learned these 3, too, and is silent for another 0.5;
+    robot 4 is out of its range. Robots 1 and 2 have sent: their news is the time since, and for
+    robot 2 what it decoded with robot 0.
+    """
+    believed_m = np.zeros((5, 5, 2))
+    believed_m[..., 0] = [0.0, 100.0, 200.0, 300.0, 400.0]
+    before, timestamp = np.full((5, 5), 8.0), np.full((5, 5), 8.0)
+    before[0], timestamp[0] = [10, 9, 8, 7, 6], [10.5, 10, 10, 7, 6]
+    heard, draw = np.array([1, 1, 2, 3, 4]), np.full((2, 5), 0.5)
+    _, news = contend(believed_m, timestamp, draw, before, np.full((5, 5), 20.0), heard)
+    np.testing.assert_array_equal(news[0], [23.5, 0.5, 3.5, 23.5, 20.5])
+    np.testing.assert_array_equal(news[1:], 20.0)  # they decoded nothing
+
+
+@given(seed=st.integers(0, 2**32 - 1))
+def test_of_robots_that_believe_the_same_one_wins_wherever_robots_are_in_reach(seed):
+    """The first by ln(u) / news³ wins, and none in reach of it does."""
+    rng = np.random.default_rng(seed)
+    position_m, news = rng.uniform(0, 1000, (30, 2)), rng.uniform(0, 50, 30)
+    draw = rng.random((2, 30))
+    wins, _ = contend(
+        np.tile(position_m, (30, 1, 1)), np.ones((30, 30)), draw, news=np.tile(news, (30, 1))
+    )
+    priority = np.log(draw[0]) / (news.astype(np.float32) + 0.5) ** 3
+    is_near = squareform(pdist(position_m)) <= 350.0
+    first = [bool(np.all(priority[is_near[i]] <= priority[i])) for i in range(30)]
+    assert wins.tolist() == first
+
+
+def test_robots_that_are_expected_but_not_known_make_a_robot_win_less_often():
+    """Robot 1 has lower numbers; of 4 robots expected 2 are known, so half of all draws win."""
+    draw, timestamp = np.array([[0.9, 0.1, 0.99], [0.49, 0.0, 0.0]]), np.ones((3, 3))
+    timestamp[:, 2] = 0.0  # never heard of
+    for second, wins in ((0.49, True), (0.51, False)):
+        draw[1, 0] = second
+        decided, _ = contend(np.zeros((3, 3, 2)), timestamp, draw, num_expected=4.0)
+        assert decided.tolist()[:2] == [wins, False]
+
+
+@pytest.mark.parametrize(("silence", "wins"), [(1.0, False), (2.0, True)])
+def test_robots_that_were_silent_for_a_round_of_turns_do_not_contend(silence, wins):
+    """Three robots' round takes one and a half windows; robot 2 has the highest number."""
+    draw, timestamp = np.array([[0.5, 0.1, 0.9], [0.0, 0.0, 0.0]]), np.full((3, 3), 100.0)
+    timestamp[0, 2] -= silence
+    assert contend(np.zeros((3, 3, 2)), timestamp, draw)[0][0] == wins
+
+
+def test_a_robot_s_own_news_grows_by_what_it_decodes_from_afar():
+    """Fading may carry a packet further than the range."""
+    believed_m, before = np.zeros((2, 2, 2)), np.full((2, 2), 8.0)
+    believed_m[:, 1] = 300.0
+    timestamp, heard = before + np.array([[0.5, 3.0], [0.0, 0.0]]), np.array([1, 1])
+    _, news = contend(believed_m, timestamp, np.full((2, 2), 0.5), before, before, heard)
+    assert news[0, 0] == 8.0 + 0.5 + 3.0
+
+
+class Doubted(SpatialTdma):
+    """Decides twice: as it is, and with all that has not reached one robot replaced by anything."""
+
+    def start(self, num_robots, rngs):
+        """Prepare both, with the same order."""
+        super().start(num_robots, rngs)
+        self.rng, self.decided, self.other = np.random.default_rng(5), [], SpatialTdma(LARGE)
+        self.other.start(num_robots, [self.rng])
+        self.other._order, self.other._draws = self._order, copy.deepcopy(self._draws)
+
+    def transmits(self, views):
+        """Note what robot 5 decides either way."""
+        is_sending = super().transmits(views)
+        buffers, phases = copy.deepcopy(views.buffers), copy.deepcopy(views.phases)
+        others = np.arange(130) != 5
+        buffers.position_m[:, others] = self.rng.uniform(-900, 900, (1, 129, 130, 2))
+        buffers.timestamp[:, others] *= self.rng.random((1, 129, 130)) < 0.9
+        for phase in phases:
+            phase.heard[:, others] = self.rng.integers(0, 130, (1, 129))
+        again = self.other.transmits(replace(views, buffers=buffers, phases=phases))
+        self.decided.append((bool(is_sending[0, 5]), bool(again[0, 5])))
+        return is_sending
+
+
+def test_a_robot_decides_by_what_has_reached_it_alone():
+    """In a flight of a large team, all that the others know and hear is replaced by anything."""
+    policy, swarm = Doubted(LARGE), Swarm(LARGE, [3])
+    for _ in range(100):
+        swarm.step(policy)
+    once, again = zip(*policy.decided, strict=True)
+    assert once == again
+    assert sum(once) > 4  # turns alone are 2 of 200 slots
+
+
+def test_large_teams_are_younger_than_by_turns_and_small_ones_fly_as_if_nobody_contended():
+    ages = {}
+    for mission in (LARGE, replace(LARGE, num_robots=100)):
+        for contends in (True, False):
+            policy, swarm = SpatialTdma(mission), Swarm(mission, [1])
+            policy._contends = policy._contends and contends
+            policy.start(mission.num_robots, [np.random.default_rng(2)])
+            ages[mission.num_robots, contends] = [swarm.step(policy).age_windows for _ in range(60)]
+    assert np.mean(ages[130, True]) < 0.95 * np.mean(ages[130, False])
+    np.testing.assert_array_equal(ages[100, True], ages[100, False])

@@ -16,6 +16,7 @@ REGIMES = [
     *[("flocking", 40, 0.25, ratio) for ratio in (0.15, 0.25, 0.325, 0.5)],
 ]
 HEADER = ",".join(Tuned.__annotations__)
+ROW = "\nmst,paper,flocking,40,0.25,0.15,0.1,20,1,50,5000,0,\n"
 
 
 def row(probability, **its):
@@ -94,9 +95,8 @@ def test_a_preset_or_task_or_policy_that_was_not_tuned_is_a_clear_error(monkeypa
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
-        ("", "columns of .* must be policy, preset"),
-        (HEADER.replace("preset,", "") + "\n", "columns of .* must be policy, preset"),
-        (HEADER + "\nmst,paper,flocking,forty,0.25,0.15,0.1,40,1,50,5000,0,\n", "forty"),
+        (HEADER.replace("preset", "mode") + ROW, "required field `preset`"),
+        (HEADER + ROW.replace("40", "forty"), "Expected `int`, got `str` .*num_robots"),
     ],
 )
 def test_a_broken_table_is_a_clear_error(tmp_path, text, complaint):
