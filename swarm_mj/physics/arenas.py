@@ -6,7 +6,7 @@ with 0, that of its material's name (`LOSS_DB`), or `DEFAULT_LOSS_DB`.
 """
 
 import os
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
@@ -34,6 +34,7 @@ ROOM_M = 170.0  # side of a room
 DOOR_M = 25.0  # width of the door in the middle of every wall between two rooms
 WALL_M = 1.0  # thickness of these walls
 NOT_FINITE = ("nan", "inf", "infinity")
+FOLDERS = ("meshdir", "texturedir", "assetdir")  # of files that a compiler element names
 MAX_REPLICAS = 10_000  # of a <replicate>; more would be compiled for minutes
 NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
 TREES_PER_KM2 = 100.0
@@ -121,7 +122,10 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
         moves = theirs.joints[0].parent.name or "a body without a name"
         raise ValueError(f"arena {mission.arena}: {moves} has a joint, but obstacles stand still")
     if num_obstacles == 0:
-        raise ValueError(f"arena {mission.arena} has no obstacle: {_why_none(theirs)}")
+        raise ValueError(
+            f"arena {mission.arena} has no obstacle, which is any geom of group {OBSTACLE_GROUP} "
+            f'but a plane or a height field; give walls group="{OBSTACLE_GROUP}"'
+        )
     idle = idle_obstacles(model, mission)
     if len(idle) == num_obstacles:
         name, where = next(iter(idle.items()))
@@ -133,47 +137,56 @@ def _from_file(spec: MjSpec, mission: Mission) -> None:
 
 def _read(file: str) -> MjSpec:
     """Read an MJCF file; raise ValueError in one line that names the file, as MuJoCo does not."""
+    path = Path(file).absolute()  # MuJoCo finds what included files include by no other
     try:
-        for element in ElementTree.parse(file).iter():
-            for name, value in element.attrib.items():
-                words = [] if name in NAMING else value.lower().split()
-                if wrong := [word for word in words if word.lstrip("+-") in NOT_FINITE]:
-                    named = element.get("name", "without a name")
-                    a = "an" if wrong[0] == "inf" else "a"
-                    raise ValueError(f"{element.tag} {named} has {a} {wrong[0]} in {name}")
-            _check_element(element, Path(file).parent)
-        return MjSpec.from_file(file)
-    except ElementTree.ParseError as error:
-        line, said = error.position[0], str(error).partition(":")[0]
-        raise ValueError(f"arena {file}, line {line}: not well-formed XML ({said})") from error
+        elements = list(_elements(path))
+        leads = (each.get(key) for each in elements if each.tag == "compiler" for key in FOLDERS)
+        folders = {path.parent, *(path.parent / lead for lead in leads if lead)}
+        for element in elements:
+            _check_element(element, folders)
+        return MjSpec.from_file(str(path))
     except ValueError as error:
         raise _refused(file, error) from error
 
 
-def _check_element(element: ElementTree.Element, folder: Path) -> None:
-    """Raise ValueError for what MuJoCo would read or compile without an end: pipes, replicas."""
+def _elements(path: Path, above: tuple[Path, ...] = ()) -> Iterator[ElementTree.Element]:
+    """Yield the elements of a file, which those above include, and of those that it includes."""
+    files = (*above, path)
+    folders = {files[0].parent, path.parent}  # MuJoCo looks in both
+    try:
+        root = ElementTree.parse(path)
+    except ElementTree.ParseError as error:
+        line, said = error.position[0], str(error).partition(":")[0]
+        raise ValueError(f"{path.name}, line {line}: not well-formed XML ({said})") from error
+    for element in root.iter():
+        yield element
+        if element.tag == "include":
+            _check_element(element, folders)  # before it is opened
+            for included in (folder / element.get("file", "") for folder in folders):
+                if included.is_file() and not any(map(included.samefile, files)):
+                    yield from _elements(included, files)
+
+
+def _check_element(element: ElementTree.Element, folders: set[Path]) -> None:
+    """Raise ValueError for numbers that are none, and for pipes and replicas without an end."""
+    for key, value in element.attrib.items():
+        words = [] if key in NAMING else value.lower().split()
+        if wrong := [word for word in words if word.lstrip("+-") in NOT_FINITE]:
+            named = element.get("name", "without a name")
+            raise ValueError(f"{element.tag} {named} has {wrong[0]} in {key}")
     count = element.get("count", "")
     if element.tag == "replicate" and count.isdigit() and int(count) > MAX_REPLICAS:
         raise ValueError(f"replicate has a count of {count}; {MAX_REPLICAS} are allowed")
-    name = element.get("file")
-    # A compiler's meshdir may lead elsewhere, but pipes are no regular content of any folder.
-    if name and (path := folder / name).exists() and not path.is_file():
-        raise ValueError(f"{element.tag} {name} is a folder, a pipe or a device; name a file")
+    if name := element.get("file"):
+        for path in (folder / name for folder in folders):
+            if path.exists() and not path.is_file():
+                raise ValueError(
+                    f"{element.tag} {name} is a folder, a pipe or a device; name a file"
+                )
 
 
 def _refused(file: str, error: ValueError) -> ValueError:
     return ValueError(f"arena {file}: {' '.join(str(error).split())}")
-
-
-def _why_none(theirs: MjSpec) -> str:
-    """Explain why a file holds no obstacle, and what to do."""
-    if not theirs.geoms:
-        why = "it has no geom; add walls"
-    elif any(geom.group == OBSTACLE_GROUP for geom in theirs.geoms):
-        why = f"its geoms of group {OBSTACLE_GROUP} are planes or height fields; give it boxes"
-    else:
-        why = f'none of its geoms is of group {OBSTACLE_GROUP}; give walls group="{OBSTACLE_GROUP}"'
-    return f"{why}, or choose arena {OPEN}"
 
 
 def _add(

@@ -122,10 +122,17 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
         return
     spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for i in range(mission.num_robots):
-        spec.geom(f"r{i}/hull").conaffinity |= 1  # meets the scene's geoms, no robot
+        _hull(spec, i).conaffinity |= 1  # meets the scene's geoms, no robot
     for geom in spec.geoms:
         if geom.group == OBSTACLE_GROUP:
             _bounce(geom, mission, priority=1)  # its own contact parameters count
+
+
+def _hull(spec: MjSpec, i: int) -> MjsGeom:
+    hull = spec.geom(f"r{i}/hull")
+    if hull is None:
+        raise ValueError(f"a scene must leave the robots' hulls, but deleted r{i}/hull")
+    return hull
 
 
 def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
@@ -190,7 +197,7 @@ def _fit_robots(spec: MjSpec, mission: Mission) -> None:
     for i in range(mission.num_robots):
         spec.geom(f"r{i}/beacon").size[0] = beacon_m
         if mission.collide:
-            hull = spec.geom(f"r{i}/hull")
+            hull = _hull(spec, i)
             hull.contype = hull.conaffinity = ROBOTS_BIT
             _bounce(hull, mission)
     force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2

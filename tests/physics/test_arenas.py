@@ -125,10 +125,13 @@ def test_names_that_are_no_arena_are_refused_with_what_is_wrong(tmp_path):
     [
         (PILLAR.replace('"20 5"', '20 5"'), "line 2: not well-formed XML"),
         ("", "line 1: not well-formed XML"),
-        (PILLAR.replace('group="1"', 'group="1" user="nan"'), "geom pillar has a nan in user"),
-        (PILLAR.replace('group="1"', ""), "none of its geoms is of group 1"),
-        ("<mujoco/>", "has no obstacle: it has no geom"),
-        (PILLAR.replace('cylinder" size="20 5', 'plane" size="20 5 1'), "are planes or height"),
+        (PILLAR.replace('group="1"', 'group="1" user="nan"'), "geom pillar has nan in user"),
+        (PILLAR.replace('group="1"', ""), "has no obstacle, which is any geom of group 1"),
+        ("<mujoco/>", 'give walls group="1"'),
+        (
+            PILLAR.replace('cylinder" size="20 5', 'plane" size="20 5 1'),
+            "but a plane or a height field",
+        ),
         (
             PILLAR.replace("0 0 5", "520.1 0 5"),
             "pillar stands outside the area of 1000 m by 1000 m",
@@ -214,23 +217,55 @@ def test_a_mesh_is_the_box_around_it():
     np.testing.assert_allclose(off.max(axis=0), found.size_m[0], atol=1e-6)
 
 
+WALL = '<worldbody><geom type="box" size="9 9 9" group="1"/></worldbody>'
+MESH = '<compiler {}="parts"/><asset><mesh name="m" file="stream.stl"/></asset>'
 BOXES = '<mujoco><worldbody>{}<geom type="box" size="9 9 9" group="1"/></worldbody></mujoco>'
 
 
 @pytest.mark.parametrize(
     ("inside", "said"),
     [
-        ('<geom type="box" size="1 9 9" pos="inf 0 5" group="1"/>', "has an inf in pos"),
-        ('<geom type="box" size="-infinity 9 9" group="1"/>', "has a -infinity in size"),
+        ('<geom type="box" size="1 9 9" pos="inf 0 5" group="1"/>', "has inf in pos"),
+        ('<geom type="box" size="-infinity 9 9" group="1"/>', "has -infinity in size"),
         ('<replicate count="100000"><geom size="1"/></replicate>', "10000 are allowed"),
         ('<include file="pipe"/>', "include pipe is a folder, a pipe or a device"),
+        ('<include file="parts/nested.xml"/>', "include pipe is a folder, a pipe or a device"),
+        ('<include file="parts/endless.xml"/>', "geom wall has inf in pos"),
+        (MESH.format("meshdir"), "mesh stream.stl is a folder, a pipe or a device"),
+        (MESH.format("assetdir"), "mesh stream.stl is a folder, a pipe or a device"),
     ],
 )
 def test_files_without_an_end_are_refused_at_once(tmp_path, inside, said):
+    (tmp_path / "parts").mkdir()
     os.mkfifo(tmp_path / "pipe")
+    os.mkfifo(tmp_path / "parts" / "stream.stl")
+    (tmp_path / "parts" / "nested.xml").write_text(BOXES.format('<include file="pipe"/>'))
+    endless = BOXES.format('<geom name="wall" size="1" pos="inf 0 5"/>')
+    (tmp_path / "parts" / "endless.xml").write_text(endless)
     path = tmp_path / "arena.xml"
-    path.write_text(BOXES.format(inside))
+    path.write_text(
+        f"<mujoco>{inside}{WALL}</mujoco>" if "compiler" in inside else BOXES.format(inside)
+    )
     with pytest.raises(ValueError, match=said):
+        Swarm(paper("stationary", num_robots=3, arena=str(path)), [1])
+
+
+def test_a_relative_arena_includes_files_that_include_others(tmp_path, monkeypatch):
+    parts = tmp_path / "city" / "parts"
+    parts.mkdir(parents=True)
+    (parts.parent / "arena.xml").write_text('<mujoco><include file="parts/a.xml"/></mujoco>')
+    (parts / "a.xml").write_text('<mujoco><include file="b.xml"/></mujoco>')
+    (parts / "b.xml").write_text(f"<mujoco>{WALL}</mujoco>")
+    monkeypatch.chdir(tmp_path)
+    swarm = Swarm(paper("stationary", num_robots=3, arena="city/arena.xml"), [1])
+    assert len(swarm._physics.obstacles.kind) == 1
+
+
+def test_files_that_include_each_other_are_refused(tmp_path):
+    (tmp_path / "city").mkdir()
+    path = tmp_path / "city" / "arena.xml"
+    path.write_text(f'<mujoco>{WALL}<include file="../city/arena.xml"/></mujoco>')
+    with pytest.raises(ValueError, match="already included"):
         Swarm(paper("stationary", num_robots=3, arena=str(path)), [1])
 
 

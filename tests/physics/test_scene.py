@@ -215,3 +215,12 @@ def test_a_scene_cannot_switch_the_solver_s_parts_off():
     mission = paper("random-walk", num_robots=3, physics="contact")
     spec = compose(mission, scene=without_limits)
     assert not spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT
+
+
+def test_a_scene_that_deletes_a_robot_s_hull_is_refused():
+    def robbing(spec, _mission):
+        spec.delete(spec.geom("r1/hull"))
+
+    mission = paper("stationary", num_robots=3, physics="contact")
+    with pytest.raises(ValueError, match="must leave the robots' hulls, but deleted r1/hull"):
+        compose(mission, scene=robbing)
