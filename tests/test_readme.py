@@ -26,6 +26,7 @@ REASONS = {
     "needs OpenGL": "video|render",
     "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari",
     "installs packages": "^pip install",
+    "takes minutes": "train",
 }
 LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml"}
 # Commands run as they are written, but for less long: what comes last on a line counts.

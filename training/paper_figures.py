@@ -10,7 +10,7 @@ as long as the commit is the same. Results wait under `runs/` until all are ther
 
 import os
 import sys
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -20,12 +20,22 @@ from swarm_mj.evaluation.flying import progress_path
 from swarm_mj.evaluation.published import RESULT_FIGURES, ResultFigure
 from swarm_mj.evaluation.results import MAX_BYTES, read_results
 from swarm_mj.mission import PAPERS
+from swarm_mj.policies.registry import WITHOUT_PAYLOAD, flown_name
 from swarm_mj.system.fields import setting
 from swarm_mj.system.packages import commit
 from swarm_mj.system.reading import read_file
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
+# All but sotdma, which is slow, and csma, which is younger than these results. The planners and gnn
+# are drawn under `paper` only: gnn was trained there, and they take several times as long as all
+# others together.
+DRAWN = (
+    "tdma",  # first: the others are compared to it
+    *("random-flooding", "round-robin", "mst", "aloha", "gossip", "spatial-tdma"),
+    *("planner", WITHOUT_PAYLOAD, "gnn", "greedy-oracle"),
+)
+PAPER_ONLY = ("planner", WITHOUT_PAYLOAD, "gnn")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -64,10 +74,18 @@ class Part:
         """The file's name."""
         return f"{self.preset}-{self.figure.task}.csv"
 
+    @property
+    def policies(self) -> Iterable[str]:
+        """The policies that are drawn."""
+        drawn = [name for name in DRAWN if self.preset == "paper" or name not in PAPER_ONLY]
+        mission = self.figure.mission(self.preset)
+        return dict.fromkeys(flown_name(name, mission) for name in drawn)
+
     def command(self, settings: Settings, jobs: int) -> list[str]:
         """Return the arguments of `swarm-mj`."""
         return [
             *self.figure.arguments(self.preset),
+            *("--policy", *self.policies),
             *("--episodes", f"{settings.episodes}", "--seed", f"{settings.first_seed}"),
             *("--jobs", f"{jobs}", "--csv", str(settings.drafts / self.name)),
             "--resume",

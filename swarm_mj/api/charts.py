@@ -1,4 +1,4 @@
-"""Charts of flights and evaluations: one mission over time, and policies below each other."""
+"""Charts: one mission over time, policies below each other, and learning curves."""
 
 import textwrap
 from collections.abc import Mapping, Sequence
@@ -9,6 +9,7 @@ import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure, SubFigure
+from matplotlib.ticker import LogLocator
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures.style import (
@@ -46,20 +47,19 @@ def draw_flight(
     `own_cost` is the name and the unit of the task's cost, if it has one.
     """
     colour = look_of(policy).colour
-    if own_cost and own_cost[0] == Flocking.cost_name:
-        own_cost = None
-    number = 2 if own_cost or np.any(columns["velocity_variance"]) else 1
+    is_flock = own_cost is not None and own_cost[0] == Flocking.cost_name
+    number = 2 if own_cost else 1
     with styled():
         figure, axes = _axes(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
         for each in axes:
             each.margins(x=0.01)
         _draw_age(axes[0], columns, colour)
-        if own_cost:
+        if own_cost and not is_flock:
             axes[1].plot(columns["window"], columns["task_cost"], color=colour)
             name, unit = own_cost
             axes[1].set_ylabel(f"{name}\n[{unit}]")
             axes[1].set_ylim(bottom=0.0)
-        elif number == 2:
+        elif is_flock:
             variance = columns["velocity_variance"]
             axes[1].semilogy(columns["window"], variance, color=colour)
             axes[1].set_ylabel(LABELS["velocity_variance"])
@@ -71,10 +71,7 @@ def draw_flight(
 
 
 def draw_evaluation(results: Sequence[Result]) -> Figure:
-    """Return a chart of policies, the lowest age first; of flocks, with velocity variances.
-
-    Results of different missions stand below each other, and each group says its missions.
-    """
+    """Return a chart of policies by missions, the lowest age first; flocks have variances, too."""
     groups = {said: list(its) for said, its in groupby(results, missions_of)}
     titles = [_lines(said) for said in groups]
     heights_in = [
@@ -89,6 +86,31 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
             part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
             _draw_policies(part, sorted(shown, key=lambda result: result.aoi_mean))
         write_caption(figure, _origin(results))
+    return kept(figure)
+
+
+def draw_learning(
+    lines: Mapping[str, Float[np.ndarray, "4 X"]], levels: Mapping[str, float], origin: str
+) -> Figure:
+    """Return a chart of learning curves, and policies' ages as levels, on the same missions.
+
+    A line has its team decisions, its ages, and the ends of their band [windows].
+    """
+    with styled():
+        figure, (axes,) = _axes("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
+        for label, (decisions, ages, low, high) in lines.items():
+            (line,) = axes.plot(decisions, ages, label=escape_mathtext(label))
+            axes.fill_between(decisions, low, high, color=line.get_color(), alpha=0.2)
+        for policy, age in levels.items():
+            look = look_of(policy)
+            axes.axhline(age, color=look.colour, linestyle=":", label=f"{look.label} {age:.1f}")
+        axes.set(xlabel="team decisions", ylabel=LABELS["aoi"], yscale="log")
+        axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.yaxis.set_minor_formatter("")
+        axes.xaxis.set_major_formatter("{x:,.0f}")
+        axes.legend(frameon=False)
+        write_caption(figure, origin)
     return kept(figure)
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from types import NoneType
 from typing import TYPE_CHECKING, Any
 
 from swarm_mj.api.fly import mission_of
@@ -16,9 +15,8 @@ from swarm_mj.evaluation.summary import Evaluated, study_results, write_evaluate
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
-from swarm_mj.policies.registry import is_learned, listed, normalised
-from swarm_mj.system import needs
-from swarm_mj.system.fields import check_value, name_of
+from swarm_mj.policies.registry import listed, missions_memory
+from swarm_mj.system.fields import check_value
 from swarm_mj.system.needs import Needs, check_fits, memory_errors
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import quiet_console
@@ -169,7 +167,7 @@ def evaluate(
         seed=seed,
         probability=probability,
         is_deterministic=is_deterministic,
-        baseline=None if baseline is None else normalised(str(baseline)),
+        baseline=None if baseline is None else str(baseline),
         features=(features,) if isinstance(features, str) else tuple(features),
         components=Components(**components),
     )
@@ -185,10 +183,7 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
     """Return the memory and disk of a study: a batch in each process, and the results of all."""
     batches = study.batches
     largest = max(
-        needs.missions_memory(
-            batch.mission.num_robots, len(batch.seeds), is_learned=is_learned(batch.policy)
-        )
-        for batch in batches
+        missions_memory(batch.policy, batch.mission, len(batch.seeds)) for batch in batches
     )
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     under_way = min(num_jobs, len(batches)) * largest
@@ -199,21 +194,17 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
 
 
 def _check_named(kind: str, part: object) -> None:
-    """Raise TypeError for what is given but no name; the message has a name that leads to it."""
-    if isinstance(part, (str, Path if kind == "policy" else NoneType)):
-        return
-    home = getattr(part, "__module__", "builtins")
-    name = f"{home}:{name_of(part)}" if home not in ("builtins", "functools") else "my_file:Name"
-    raise TypeError(
-        f'evaluate takes the {kind} by name, such as "{name}", not {part!r:.80}: it flies missions '
-        "in several processes, which each make their own"
-    )
+    if not isinstance(part, str | Path | None):
+        raise TypeError(
+            f'evaluate takes the {kind} by name, such as "my_file:Name", not {part!r:.80}: it '
+            "flies missions in several processes, which each make their own"
+        )
 
 
 def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
-    if not isinstance(policies, str | Path | Iterable):
-        raise TypeError(f"policies must be a list of names, not {policies!r:.80}")
-    named = [policies] if isinstance(policies, str | Path) else list(policies)
-    for name in named:
+    if isinstance(policies, str) or not isinstance(policies, Iterable):
+        policies = [policies]
+    names = list(policies)  # what is given may be gone through once only
+    for name in names:
         _check_named("policy", name)
-    return tuple(listed(normalised(str(name)) for name in named))
+    return tuple(listed(map(str, names)))

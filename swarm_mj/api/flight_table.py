@@ -9,10 +9,9 @@ import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import where_flown
-from swarm_mj.mission.specification import NOTHING
+from swarm_mj.mission.presets import bits_per_second, where_flown
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
+from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.simulation.rollout import Summary
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
@@ -45,12 +44,7 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
     team = f"{mission.num_robots} robots" + (" that collide" if mission.collide else "")
     if mission.failure_fraction:
         team += f", {mission.failure_fraction:.0%} of them off half-way"
-    parts = [mission.task, policy, team, f"seed {seed}", *where_flown(mission)]
-    if mission.prior_knowledge != NOTHING:
-        parts.append(f"known {mission.prior_knowledge}")
-    if mission.bit_rate is not None:
-        parts.append(bits_per_second(mission.bit_rate))
-    return ", ".join(parts)
+    return ", ".join([mission.task, policy, team, f"seed {seed}", *where_flown(mission)])
 
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
@@ -61,7 +55,9 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
         f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",
         "age of information, mean": _windows(numbers["aoi_mean"], mission, 2),
         "everyone had heard of everyone": (
-            "never" if complete is None else f"after {_windows(complete, mission, 0)}"
+            f"never; {numbers['heard_share']:.0%} of pairs at the end"
+            if complete is None
+            else f"after {_windows(complete, mission, 0)}"
         ),
         "radio hops that news travelled, mean": f"{hops:.2f}" if hops else "-",
         **_packets(numbers),

@@ -14,6 +14,7 @@ from dataclasses import asdict, fields, replace
 from pathlib import Path
 from typing import Any, NamedTuple
 
+import numpy as np
 from rich.console import Console
 
 from swarm_mj.api.flight_table import flight_numbers
@@ -149,7 +150,8 @@ def mission_of(
 
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     """Return the memory and disk that a flight takes."""
-    memory = needs.missions_memory(mission.num_robots, 1, is_learned=registry.is_learned(policy))
+    memory = registry.missions_memory(policy, mission)
+    memory += needs.FLYING - needs.LIBRARIES
     if not is_recorded:
         return Needs(memory=memory)
     return Needs(
@@ -201,9 +203,19 @@ def fly_mission(
     }
     numbers = flight_numbers(mission, policy, summarise(windows))
     numbers |= {"wall_seconds": wall_s, "interrupted": code != DONE}
+    numbers["heard_share"] = _heard_share(swarm)
     run = Run(mission=mission, config=config, summary=Metrics(numbers), windows=tuple(windows))
     when = f"{ending} after {len(windows)} of {mission.num_windows} windows" if ending else ""
     return Flown(run=run, recorder=recorder, code=code, ending=when)
+
+
+def _heard_share(swarm: Swarm) -> float:
+    """Return the share of the pairs of active robots of which the first has heard of the second."""
+    is_on = swarm.states.is_active
+    on = slice(None) if is_on is None else is_on[0]
+    is_known = swarm.buffers.is_known[0][on][:, on]
+    own = len(is_known)  # a robot knows itself
+    return float((np.sum(is_known) - own) / (is_known.size - own))
 
 
 def _fly_windows(
@@ -234,10 +246,7 @@ def _fly_windows(
 
 
 def compile_ahead(mission: Mission, policy_name: str, **how: Any) -> None:
-    """Fly a small mission of this kind, beyond half-way, so that compiling is not timed.
-
-    Name and `how` are arguments of `make_policy`.
-    """
+    """Fly a small mission of this kind, beyond half-way, so that compiling is not timed."""
     # A stored policy may be for teams of one size, and a file's arena does not shrink.
     is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
     robots = mission.num_robots if is_bound else 3
@@ -255,7 +264,7 @@ def _policy_of(
     """Return a policy and its name: what was given, or its class's."""
     if not isinstance(policy, Policy):
         check_kind("policy", policy, (str, Path), '"planner"')
-        name = registry.flown_name(registry.normalised(str(policy)), mission)
+        name = registry.flown_name(str(policy), mission)
         return registry.make_policy(name, mission, **how), name
     if how["probability"] is not None or how["is_deterministic"]:
         raise TypeError(

@@ -34,7 +34,6 @@ LARGE_PT, TEXT_PT, SMALL_PT = 22.0, 13.0, 10.5
 LINE = 1.45  # of a line's height, by the size of its type
 CHARACTERS = 52  # of a line
 POINTS_PER_IN = 72.0
-FATES = {"heard": "packet heard"}  # in words, where the fate's name does not say it
 
 Colour = tuple[float, float, float]
 
@@ -53,7 +52,7 @@ def draw_picture(footage: Footage, window: int | None = None) -> Figure:
         axes = figure.add_axes(sides)
         radius_m = _frame(axes, footage, row)
         shown = _draw_ground(axes, footage)
-        if footage.has_motion:
+        if np.ptp(_trails(footage, row), axis=0).max() > radius_m:  # or else robots hide them
             shown.append(_draw_trails(axes, footage, row))
         shown += _draw_robots(axes, footage, row)
         shown += _draw_packets(axes, footage, row, radius_m)
@@ -179,8 +178,8 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
         how = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0028, "headwidth": 4.5}
         x, y, along_x, along_y = np.hstack([start_m, along_m]).T
         axes.quiver(x, y, along_x, along_y, color=colour, zorder=5.0, alpha=0.9, **how)
-        name = FATES.get(fate, f"packet {fate}")
-        shown.append(Line2D([], [], color=colour, marker=">", markevery=[1], label=name))
+        label = f"packet {fate}"
+        shown.append(Line2D([], [], color=colour, marker=">", markevery=[1], label=label))
     return shown
 
 

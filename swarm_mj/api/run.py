@@ -153,8 +153,8 @@ class Run:
     def plot(self) -> "Figure":
         """Draw the age of information over time and, below, the task's cost.
 
-        Of flocks and random walks that is the velocity variance. A notebook shows the figure where
-        it is the cell's result, `savefig` keeps it, and `matplotlib.pyplot.show()` opens a window.
+        Of flocks that is the velocity variance. A notebook shows the figure where it is the cell's
+        result, `savefig` keeps it, and `matplotlib.pyplot.show()` opens a window.
         """
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_flight

@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
+from itertools import product
 from pathlib import Path
 from typing import ClassVar
 
@@ -16,12 +17,11 @@ from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.figures import quiet_matplotlib
-from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import listed, normalised, stored_policies, with_payload
+from swarm_mj.policies import registry
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -40,7 +40,7 @@ class EvaluateOptions(PolicyOptions):
         "--csv, --resume continues)."
     )
     policy: tuple[str, ...] = setting(
-        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", convert=normalised, is_common=True
+        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", is_common=True
     )
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")
@@ -60,7 +60,9 @@ class EvaluateOptions(PolicyOptions):
         is_common=True,
     )
     wide: bool = output_option(
-        False, "print more columns: quantiles, bytes, published values", is_common=True
+        False,
+        "print more columns: velocity variance, quantiles, bytes, published values",
+        is_common=True,
     )
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)
@@ -69,8 +71,8 @@ class EvaluateOptions(PolicyOptions):
     @property
     def study(self) -> Study:
         """The study that the options name; raises ValueError as it does."""
-        named = listed(self.policy)
-        flown = dict(zip(named, with_payload(named, self.payload), strict=True))
+        named = registry.listed(self.policy)
+        flown = dict(zip(named, registry.with_payload(named, self.payload), strict=True))
         return Study(
             policies=tuple(dict.fromkeys(flown.values())),
             regimes=self.missions,
@@ -90,7 +92,7 @@ def run(options: EvaluateOptions) -> int:
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
     if options.plot:
         need("matplotlib", "a chart")
-    inputs = stored_policies(options.policy)
+    inputs = registry.stored_policies(options.policy)
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
     needs = study_needs(study, options.jobs)
@@ -105,6 +107,8 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     """Fly the rest of a study, and write its results; `kept` is the progress file."""
     tell_cores(options.jobs)
     console = Console(stderr=True, highlight=False)
+    if study.pairs != list(product(study.regimes, study.policies)):
+        console.print(registry.FLOWN_AS)
     header = study.header()
     costs: dict[int, BatchCosts] = {}
     if kept and options.resume and kept.exists():
@@ -131,17 +135,13 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     results = [each.result for each in evaluated]
     print_results(results, is_wide=options.wide)
     if options.plot:
-        _plot(options.plot, results)
+        quiet_matplotlib()
+        from swarm_mj.api.charts import draw_evaluation  # matplotlib is slow to import
+        from swarm_mj.evaluation.figures.style import save
+
+        save(draw_evaluation(results), options.plot)
+        plain_console().print(f"Wrote {shlex.quote(str(options.plot))}")
     return DONE
-
-
-def _plot(path: Path, results: list[Result]) -> None:
-    quiet_matplotlib()
-    from swarm_mj.api.charts import draw_evaluation  # matplotlib is slow to import
-    from swarm_mj.evaluation.figures.style import save
-
-    save(draw_evaluation(results), path)
-    plain_console().print(f"Wrote {shlex.quote(str(path))}")
 
 
 def _progress_file(options: EvaluateOptions, outputs: Iterable[Output]) -> Path | None:

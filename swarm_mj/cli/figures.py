@@ -8,17 +8,13 @@ from rich.console import Console
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
-from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.evaluation.results import read_results
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import setting
-from swarm_mj.system.needs import LIBRARIES, YES, Needs, check_fits
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
-DRAWING = 2.0 * LIBRARIES  # matplotlib's memory besides [bytes]
-OBJECTS = 10.0  # bytes of memory for a byte of results
-PICTURE = 1e6  # the largest file [bytes]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,7 +38,7 @@ class FiguresOptions:
         shown="all",
     )
     force: bool = setting(False, "replace existing figures")
-    yes: bool = setting(False, YES)
+    yes: bool = setting(False, "ignored: drawing needs little memory")
     flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)
     flock_seed: int = setting(1, "its seed", group=FLOCKS)
 
@@ -50,8 +46,6 @@ class FiguresOptions:
 def run(options: FiguresOptions) -> int:
     """Run the command; return its exit code."""
     paths = _paths(options)
-    needs = figures_needs(options.results, sum(map(len, paths.values())))
-    check_fits(needs, options.out, "draw fewer results at once", is_forced=options.yes)
     results = [result for path in options.results for result in read_results(path)]
     console = plain_console()
     with Console(stderr=True).status("Drawing ...") as status:
@@ -59,9 +53,9 @@ def run(options: FiguresOptions) -> int:
         from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of  # slow to import
         from swarm_mj.evaluation.figures.drawing import draw
         from swarm_mj.evaluation.figures.flock import draw_flock
-        from swarm_mj.evaluation.figures.style import save
+        from swarm_mj.evaluation.figures.style import LOOKS, save
 
-        _check_methods(options.policy, results)
+        _check_methods(options.policy, [*LOOKS, *(result.policy for result in results)])
         policy, seed = options.flock_policy, options.flock_seed
         drawn = {}
         for name in sorted(paths, key=FLOCK.__eq__):  # it flies, and what is refused comes first
@@ -72,8 +66,7 @@ def run(options: FiguresOptions) -> int:
                 else:
                     drawn[name] = draw(RESULT_FIGURES[name], results, options.policy)
             except NoPointsError:
-                is_last_hope = name == FIGURES[-1] and set(drawn) <= {FLOCK}
-                if options.figure != FIGURES or is_last_hope:
+                if options.figure != FIGURES:
                     raise
         written = [(drawn[name], path) for name in paths if name in drawn for path in paths[name]]
         for figure, path in written:  # once all are drawn, so that a failure writes none
@@ -85,20 +78,11 @@ def run(options: FiguresOptions) -> int:
     return 0
 
 
-def _check_methods(methods: Sequence[str], results: Sequence[Result]) -> None:
-    """Raise ValueError for a method that neither the results nor the paper's figures have."""
-    from swarm_mj.evaluation.figures.style import LOOKS
-
-    known = dict.fromkeys([*LOOKS, *(result.policy for result in results)])
+def _check_methods(methods: Sequence[str], known: Sequence[str]) -> None:
     for method in methods:
         if method not in known:
-            raise ValueError(f"policy must be one of {', '.join(known)}, not {method!r}")
-
-
-def figures_needs(results: tuple[Path, ...], num_files: int) -> Needs:
-    """Return what drawing takes: the results as objects, and files of pictures."""
-    read = sum(path.stat().st_size for path in results if path.is_file())
-    return Needs(memory=DRAWING + OBJECTS * read, file=PICTURE * num_files)
+            every = ", ".join(dict.fromkeys(known))
+            raise ValueError(f"policy must be one of {every}, not {method!r}")
 
 
 def _paths(options: FiguresOptions) -> dict[str, list[Path]]:

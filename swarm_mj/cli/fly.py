@@ -3,7 +3,7 @@
 import os
 import shlex
 from collections.abc import Iterator
-from contextlib import ExitStack
+from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
@@ -30,7 +30,6 @@ from swarm_mj.system.writing import Output, check_outputs, write_json
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
-NO_REPLAY = "no replay is recorded: it"
 COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a first comparison
 
 
@@ -45,7 +44,6 @@ class FlyOptions(PolicyOptions):
     policy: str = setting(
         "planner",
         f"{NAMES}, a directory with a learned policy, or module:Name of your own",
-        convert=registry.normalised,
         is_common=True,
     )
     seed: int = setting(1, "the same seed is the same mission", is_common=True)
@@ -85,6 +83,8 @@ def run(options: FlyOptions) -> int:
         console=console,
         way_on=None if options.yes else "; --yes flies on all the same",
     )
+    if options.policy != asked:
+        console.print(registry.FLOWN_AS)
     for note in notes_on(mission):
         console.print(note)
     with deferred_interrupt(), ExitStack() as stack:
@@ -119,11 +119,16 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
     if path:
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
     yield "Other policies:", f"{name} policies"
-    policies = " ".join(map(shlex.quote, dict.fromkeys((options.policy, *COMPARED))))
+    policies = [options.policy]
+    for other in COMPARED:
+        with suppress(ValueError):  # its packets are larger than a slot
+            registry.make_policy(other, options.mission)
+            policies.append(other)
     parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.names.items()]
     parts += [f"--features {shlex.join(options.features)}"] if options.features else []
+    named = shlex.join(dict.fromkeys(policies))
     flags = " ".join((mission_flags(options.mission), *parts))
-    yield "Compare some:", f"{name} evaluate --policy {policies} --episodes 5 {flags}"
+    yield "Compare some:", f"{name} evaluate --policy {named} --episodes 5 {flags}"
 
 
 def _replay_path(options: FlyOptions) -> Path | None:
@@ -134,7 +139,7 @@ def _replay_path(options: FlyOptions) -> Path | None:
         raise ValueError("--view needs a replay; leave out --no-record")
     is_chosen = options.no_record or options.record or options.view
     if not (is_chosen or is_installed("rerun")):
-        plain_console(is_error=True).print(missing("rerun", NO_REPLAY))
+        plain_console(is_error=True).print(missing("rerun", "no replay is recorded: it"))
         options = replace(options, no_record=True)
     path = None if options.no_record else options.record or _fresh_name(options)
     what, way_out = ("--record", "") if options.record else ("the replay", OTHERWISE)

@@ -67,10 +67,7 @@ def several_missions() -> FieldOf:
 
 
 def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
-    """Return the missions that options name, by `mission.` and the field's name; a list sweeps.
-
-    The last field's values vary fastest; raises ValueError if one is unknown or out of range.
-    """
+    """Return the missions that options name, by `mission.` and the field's name; a list sweeps."""
     swept: dict[str, Iterable[Any]] = {}
     for spec in SPECS:
         place = f"mission.{spec.name}"
@@ -81,7 +78,9 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
         make_mission(**dict(zip(swept, values, strict=True))) for values in product(*swept.values())
     ]
     check_in_use(swept, missions)
-    return tuple(missions)
+    # A fraction that rounds to no robot makes the missions of 0, which are flown once.
+    made = (m if m.num_high_power else replace(m, high_power_fraction=0.0) for m in missions)
+    return tuple(dict.fromkeys(made))
 
 
 def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:

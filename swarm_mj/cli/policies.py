@@ -14,7 +14,7 @@ from rich.table import Column, Table
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, normalised
+from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy
 from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, setting
@@ -43,7 +43,6 @@ class PoliciesOptions:
         "say more of this one: a policy, where a learned one is, or module:Name of your own",
         is_positional=True,
         metavar="NAME",
-        convert=normalised,
     )
     json: bool = setting(False, "print JSON in place of the table", is_common=True)
     mission: Mission = one_mission()

@@ -15,7 +15,6 @@ from swarm_mj.replay import view
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import raise_if_interrupted
-from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import WorkBar, plain_console
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
@@ -27,7 +26,6 @@ VIDEO, PICTURE = "video", "picture"  # headings of the help
 _video = partial(setting, group=VIDEO)
 OWN_TIME = f"the mission's own time, {view.LONGEST_S:g} at most"
 BARE = "the bare arena"
-SUFFIXES, PICTURES = ".mp4|.gif", ".png|.svg|.pdf"
 PIXELS = (160, 3840)  # of a side
 
 
@@ -71,7 +69,7 @@ class ReplayOptions:
         shown=BARE,
     )
     force: bool = _video(False, "replace an existing video or picture")
-    yes: bool = _video(False, YES)
+    yes: bool = _video(False, "ignored: videos are made without an estimate")
 
 
 def run(options: ReplayOptions) -> int:
@@ -112,7 +110,9 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
     if others:
         raise ValueError(f"a picture shows 1 replay, not {len(options.file)}; name one")
     is_new = not options.force
-    check_outputs(Output("picture", picture, PICTURES), inputs=options.file, must_be_new=is_new)
+    check_outputs(
+        Output("picture", picture, ".png|.svg|.pdf"), inputs=options.file, must_be_new=is_new
+    )
     for module in ("matplotlib", "rerun"):
         need(module, "a picture")
     quiet_matplotlib()
@@ -128,15 +128,11 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
 
 
 def _make_video(options: ReplayOptions, video: Path) -> int:
-    if len(options.file) > view.MAX_MISSIONS:
-        raise ValueError(f"a video shows 1 or {view.MAX_MISSIONS} replays, not {len(options.file)}")
     check_outputs(
-        Output("video", video, SUFFIXES), inputs=options.file, must_be_new=not options.force
+        Output("video", video, ".mp4|.gif"), inputs=options.file, must_be_new=not options.force
     )
     suffix = video.suffix.lower()
     style = _style(options, suffix)
-    needs = view.video_needs(style.width, style.height, style.num_frames, suffix)
-    check_fits(needs, video, "choose a smaller --size or fewer --seconds", is_forced=options.yes)
     for module in ("av", "PIL", "rerun"):
         need(module, "a video")
     from swarm_mj.replay.read import read_footage

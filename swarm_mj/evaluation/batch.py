@@ -1,7 +1,8 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -9,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components, one_line_each
 from swarm_mj.mission.geometry import gather_connected
-from swarm_mj.policies.policy import Parameters, Policy
+from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
@@ -26,19 +27,12 @@ TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")  # of `cost
 class Batch:
     """The work of one process at a time."""
 
-    policy: str  # what `make_policy` takes
-    probability: float | None  # of a transmission; None is the policy's own
-    is_deterministic: bool = False  # a learned policy takes its most probable recipient
-    features: tuple[str, ...] = ()  # users' own extractors that a learned policy may load
+    policy: str
+    how: Mapping[str, Any]  # arguments of `make_policy` beside it and the mission
     components: Components = Components()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
     seeds: Sequence[int] = ()  # one per mission
-
-    def made(self) -> Policy:
-        """Make the batch's policy."""
-        how = {"is_deterministic": self.is_deterministic, "features": self.features}
-        return make_policy(self.policy, self.mission, self.probability, **how)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -74,7 +68,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
             drawn, or a part of the user's own raised.
     """
     swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
-    policy = batch.made()
+    policy = make_policy(batch.policy, batch.mission, **batch.how)
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"
@@ -83,10 +77,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
 
 
 def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
-    """Add up what a swarm's missions cost while all their windows are flown.
-
-    Sums run window by window, so they round alike whatever the number of missions.
-    """
+    """Add up what missions cost, window by window: however many fly, the sums round alike."""
     mission = swarm.mission
     shape = swarm.states.position_m.shape[:2]
     num_windows = mission.num_windows

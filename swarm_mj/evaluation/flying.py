@@ -37,7 +37,6 @@ Product = TypeVar("Product")
 SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 # Nor does any import modules of the current folder, as `python -c` would.
 SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
-DIGEST_DIGITS = 16
 MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
 
 
@@ -189,7 +188,7 @@ def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]
 
 def _line(first: bytes, text: bytes) -> bytes:
     """Return a line of JSON with its digest; `first` is the JSON of the file's first line."""
-    return b"%b %b\n" % (hashlib.sha256(first + text).hexdigest()[:DIGEST_DIGITS].encode(), text)
+    return b"%b %b\n" % (hashlib.sha256(first + text).hexdigest()[:16].encode(), text)
 
 
 def _differences(name: str, before: object, now: object) -> Iterator[str]:

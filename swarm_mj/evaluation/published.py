@@ -11,8 +11,6 @@ walks cost at range ratio 0.25 and velocity ratio 0.15.
 """
 
 import math
-import shlex
-from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
@@ -21,7 +19,6 @@ from typing import Literal, NamedTuple
 import msgspec
 
 from swarm_mj.mission import PAPERS, Mission, Task
-from swarm_mj.policies.registry import WITHOUT_PAYLOAD, flown_name
 from swarm_mj.system.reading import read_rows
 
 BASELINES = ("random-flooding", "round-robin", "mst")  # the paper's three
@@ -32,15 +29,6 @@ OPTIONS = {
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-# All but sotdma, which is slow, and csma, which is younger than these results. The planners and gnn
-# are drawn under `paper` only: gnn was trained there, and they take several times as long as all
-# others together.
-DRAWN = (
-    "tdma",  # first: the others are compared to it
-    *("random-flooding", "round-robin", "mst", "aloha", "gossip", "spatial-tdma"),
-    *("planner", WITHOUT_PAYLOAD, "gnn", "greedy-oracle"),
-)
-PAPER_ONLY = ("planner", WITHOUT_PAYLOAD, "gnn")
 Scale = Literal["linear", "log"]
 
 
@@ -122,16 +110,12 @@ class ResultFigure:
 
     def command(self, preset: str) -> str:
         """Return the command that makes the figure's results."""
-        return shlex.join(["swarm-mj", *self.arguments(preset), "--csv", "FILE"])
+        return " ".join(["swarm-mj", *self.arguments(preset), "--csv FILE"])
 
-    def arguments(self, preset: str) -> Sequence[str]:
-        """Return the arguments of `swarm-mj` that make the figure's results, without the file."""
-        drawn = [policy for policy in DRAWN if preset == "paper" or policy not in PAPER_ONLY]
-        flown = dict.fromkeys(flown_name(policy, self.mission(preset)) for policy in drawn)
-        command = ["evaluate", "--policy", *flown, "--task", self.task, "--preset", preset]
-        if self.sweeps_missions:
-            command += [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)]
-        return command
+    def arguments(self, preset: str) -> list[str]:
+        """Return the arguments of `swarm-mj` that fly the figure's missions."""
+        swept = [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)] if self.sweeps_missions else []
+        return ["evaluate", "--task", self.task, "--preset", preset, *swept]
 
 
 RECEPTIVE_FIELD = ResultFigure(

@@ -1,15 +1,14 @@
 """Results of evaluations as files: one row per policy and regime, as CSV or JSON."""
 
 from collections.abc import Iterable
-from contextlib import suppress
-from dataclasses import MISSING, Field, asdict, dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
-from types import NoneType
-from typing import Any, get_args
+from typing import Any
 
-from swarm_mj.mission import Mission
+import msgspec
+
 from swarm_mj.mission.specification import NOTHING
-from swarm_mj.system.fields import FORMER_NAMES, check_value, kind_of
+from swarm_mj.system.fields import FORMER_NAMES
 from swarm_mj.system.reading import read_json, read_rows
 from swarm_mj.system.writing import write_csv
 
@@ -122,17 +121,12 @@ def config_of(result: Result) -> dict[str, Any]:
         return read_json(result.config, dict)
     except ValueError as error:
         raise ValueError(
-            f"config of {result.policy} must be a JSON object, not {result.config!r:.60}; make "
-            "the results with `swarm-mj evaluate --csv FILE`"
+            f"config of {result.policy} must be a JSON object, not {result.config!r:.60}"
         ) from error
 
 
 COLUMNS = tuple(spec.name for spec in fields(Result))
-NEEDED = tuple(spec.name for spec in fields(Result) if spec.default is MISSING)
-REPEATED = {spec.name: spec for spec in fields(Mission) if spec.name in COLUMNS}
-MAX_BYTES, MAX_CHARACTERS = 100_000_000, 10_000  # of a file, of a cell
-MIN_COST, MAX_NUMBER, MAX_COUNT = -1e-6, 1e9, 2**63  # a cost of 0 may be rounded to less
-EXPECTED = {int: "a whole number", float: "a finite number from {low} to 1e9", str: "a text"}
+MAX_BYTES = 100_000_000  # of a file
 
 
 def read_results(path: Path) -> list[Result]:
@@ -141,17 +135,14 @@ def read_results(path: Path) -> list[Result]:
     Columns that no result has are ignored, and those with a default may be missing.
 
     Raises:
-        ValueError: The file cannot be read, is no CSV, lacks columns or rows, or a cell is not what
-            it must be.
+        ValueError: The file cannot be read, is no CSV, lacks columns or rows, or a cell is not of
+            its column's kind.
     """
-    what = f"results file {path}"
     try:
-        names, rows = read_rows(path, "results file", MAX_BYTES)
-        if missing := [name for name in NEEDED if name not in names]:
-            raise ValueError(f"{what} lacks the columns {', '.join(missing)}")
+        _, rows = read_rows(path, "results file", MAX_BYTES)
         if not rows:
-            raise ValueError(f"{what} has no rows")
-        return [_result(f"{what}, line {line}", row) for line, row in rows]
+            raise ValueError(f"results file {path} has no rows")
+        return [_result(f"results file {path}, line {line}", row) for line, row in rows]
     except ValueError as error:
         raise ValueError(f"{error}; make them with `swarm-mj evaluate --csv FILE`") from error
 
@@ -162,29 +153,8 @@ def write_results(path: Path, results: Iterable[Result]) -> None:
 
 
 def _result(place: str, row: dict[str, str]) -> Result:
-    present = {FORMER_NAMES.get(name, name): cell for name, cell in row.items()}
-    given = (spec for spec in fields(Result) if spec.name in present)
+    cells = {FORMER_NAMES.get(name, name): cell or None for name, cell in row.items()}
     try:
-        values: dict[str, Any] = {spec.name: _value(spec, present[spec.name]) for spec in given}
-        return Result(**values)
-    except ValueError as error:
+        return msgspec.convert(cells, Result, strict=False)
+    except msgspec.ValidationError as error:
         raise ValueError(f"{place}: {error}") from error
-
-
-def _value(spec: Field[Any], text: str) -> str | float | int | None:
-    if text == "" and NoneType in get_args(spec.type):
-        return None
-    kind: Any = kind_of(spec)
-    is_signed = "difference" in spec.name
-    low = 1.0 if kind is str else -MAX_NUMBER if is_signed else MIN_COST
-    high = {str: MAX_CHARACTERS, int: MAX_COUNT, float: MAX_NUMBER}[kind]
-    value: Any = None
-    with suppress(ValueError):  # then it stays None
-        value = kind(text)
-    size = len(text) if kind is str else value
-    if size is None or not low <= size <= high:
-        expected = EXPECTED[kind].format(low="-1e9" if is_signed else "0")
-        raise ValueError(f"{spec.name} must be {expected}, not {text!r:.60}")
-    if spec.name in REPEATED:
-        check_value(REPEATED[spec.name], value)
-    return value

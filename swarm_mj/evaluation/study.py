@@ -12,8 +12,8 @@ from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.mission.components import Components, digest
+from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Parameters, Policy
-from swarm_mj.policies.registry import check_used, flown_name, is_learned, is_own_policy, normalised
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.packages import code_digest, commit, version
 
@@ -54,7 +54,6 @@ class Study:
         "whom the others are compared to, mission by mission",
         metavar="POLICY",
         shown="the first policy",
-        convert=normalised,
         is_common=True,
     )
 
@@ -67,7 +66,7 @@ class Study:
                 f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "
                 f"{self.episodes} missions included, not {self.seed}"
             )
-        if self.is_deterministic and not any(map(is_learned, self.policies)):
+        if self.is_deterministic and not any(map(registry.is_learned, self.policies)):
             raise ValueError(
                 "only learned policies can be deterministic, and none is among "
                 f"{', '.join(self.policies)}; leave it out, or add one"
@@ -77,10 +76,7 @@ class Study:
             self.components.made(regime)
         if self.features:
             made = (self.make_policy(name, self.regimes[0]) for name in self.policies)
-            check_used(self.features, made)
-        asked = list(product(self.regimes, self.policies))
-        if len(set(asked)) < len(asked):
-            raise ValueError("an evaluation needs each policy and each regime once")
+            registry.check_used(self.features, made)
         if self.baseline is not None and self.baseline not in self.policies:
             raise ValueError(
                 f"baseline must be one of the policies evaluated, {', '.join(self.policies)}, not "
@@ -96,7 +92,8 @@ class Study:
     def pairs(self) -> list[tuple[Mission, str]]:
         """Every regime with every policy, regime by regime."""
         pairs = product(self.regimes, self.policies)
-        return list(dict.fromkeys((regime, flown_name(name, regime)) for regime, name in pairs))
+        flown = ((regime, registry.flown_name(name, regime)) for regime, name in pairs)
+        return list(dict.fromkeys(flown))
 
     @property
     def num_missions(self) -> int:
@@ -109,7 +106,14 @@ class Study:
         seeds = range(self.seed, self.seed + self.episodes)
         parts = [seeds[start : start + BATCH_SIZE] for start in range(0, len(seeds), BATCH_SIZE)]
         return tuple(
-            self._batch(policy, regime, parameters=self.parameters[regime, policy], seeds=part)
+            Batch(
+                policy=policy,
+                how=self._how(policy),
+                components=self.components,
+                parameters=self.parameters[regime, policy],
+                mission=regime,
+                seeds=part,
+            )
             for regime, policy in self.pairs
             for part in parts
         )
@@ -121,20 +125,14 @@ class Study:
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:
         """Make a policy as it is evaluated in a regime; refuse one whose packets never fit."""
-        made = self._batch(policy, regime).made()
+        made = registry.make_policy(policy, regime, **self._how(policy))
         made.packet(regime)
         return made
 
-    def _batch(self, policy: str, regime: Mission, **work: Any) -> Batch:
-        return Batch(
-            policy=policy,
-            probability=self.probability,
-            is_deterministic=self.is_deterministic and is_learned(policy),
-            features=self.features,
-            components=self.components,
-            mission=regime,
-            **work,
-        )
+    def _how(self, policy: str) -> dict[str, Any]:
+        is_deterministic = self.is_deterministic and registry.is_learned(policy)
+        how = {"probability": self.probability, "is_deterministic": is_deterministic}
+        return how | {"features": self.features}
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """Return the name and the unit of a regime's task cost; None if its controller has none."""
@@ -149,7 +147,7 @@ class Study:
 
     def header(self) -> dict[str, Any]:
         """All that the batches' costs depend on, as JSON gives it back."""
-        own = [name for name in self.policies if is_own_policy(name)]
+        own = [name for name in self.policies if registry.is_own_policy(name)]
         own += [*self.features, *self.components.names.values()]
         header = {
             "version": version(),

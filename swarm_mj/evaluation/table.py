@@ -2,8 +2,8 @@
 
 import io
 from collections.abc import Callable, Iterator, Sequence
-from functools import partial
 from itertools import groupby
+from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -11,8 +11,9 @@ from rich.table import Table
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
+from swarm_mj.mission.presets import bits_per_second, paper
 from swarm_mj.mission.specification import NOTHING, OPEN
-from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
+from swarm_mj.protocol.packets import BITS_PER_BYTE
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the table
@@ -33,19 +34,12 @@ def print_results(
 
     It has the age, its difference to the baseline's and the share heard; a wide one has all.
     """
-    is_terminal = None if file is None else False
-    open_console = partial(
-        Console,
-        file=file,
-        force_terminal=is_terminal,
-        force_jupyter=False,
-        highlight=False,
-        markup=False,
-    )
-    console = open_console()
+    how: dict[str, Any] = {"file": file, "force_terminal": None if file is None else False}
+    how |= {"force_jupyter": False, "highlight": False, "markup": False}
+    console = Console(**how)
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
-    wide = open_console(width=width)
+    wide = Console(width=width, **how)
     for regime, group in groupby(results, missions_of):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
@@ -72,11 +66,15 @@ def missions_of(result: Result) -> str:
     if result.failure_fraction:
         fates += f", {result.failure_fraction:.0%} of the robots off half-way"
     flown = f"{result.episodes} mission{'s' * (result.episodes != 1)} from seed {result.seed}"
+    usual, moves = paper("stationary"), "\n"
+    # At rest neither counts, but what was asked for tells missions apart.
+    motion = (result.task, result.velocity_ratio, result.boundary)
+    if motion != (usual.task, usual.velocity_ratio, usual.boundary):
+        moves = f" velocity ratio {result.velocity_ratio:g},\nboundary {result.boundary}, "
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
-        f"{result.range_ratio:g}, velocity ratio {result.velocity_ratio:g},\nboundary "
-        f"{result.boundary}, {result.num_windows} windows of {result.physics} physics{fates}, "
-        f"{flown}{own}"
+        f"{result.range_ratio:g},{moves}{result.num_windows} windows of {result.physics} "
+        f"physics{fates}, {flown}{own}"
     )
 
 
@@ -177,6 +175,9 @@ def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
     ]
     if sent and is_wide:
         yield f"sent by the team [kbit/s]: {', '.join(sent)}"
+    late = [f"{r.policy} {r.complete_share:.0%}" for r in results if r.complete_share < 0.5]
+    if late:
+        yield f"missions that ended with everyone having heard of everyone: {', '.join(late)}"
     # A flock's course depends on its policy, so each policy may have a bound of its own.
     bounds = [result.aoi_floor_mean for result in results if result.aoi_floor_mean is not None]
     low, high = f"{min(bounds, default=0):.2f}", f"{max(bounds, default=0):.2f}"

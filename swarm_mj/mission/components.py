@@ -111,7 +111,8 @@ def load(kind: str, name: str) -> object:
     `kind` says for messages what it is to be, such as "channel". Raises ValueError if the name has
     another form, leads nowhere, or the module cannot be imported.
     """
-    _check_form(kind, name)
+    if not FORM.fullmatch(name):
+        raise ValueError(f"{kind} must be named module:Name, such as my_parts:Mine, not {name!r}")
     module_name, _, attribute = name.partition(":")
     module = _import(kind, name, module_name)
     if not hasattr(module, attribute):
@@ -180,23 +181,6 @@ def one_line_each() -> Iterator[None]:
         innermost = theirs[-1]  # as it raised
         said = f"{_loaded[innermost]} raised {_in_a_line(causes[-1], innermost)}"
         raise ValueError(said) from error
-
-
-def _check_form(kind: str, name: str) -> None:
-    """Raise ValueError, with what it should be, unless a name has the form of one."""
-    module, _, attribute = name.partition(":")
-    if module.endswith(".py"):
-        dotted = module.removesuffix(".py").removeprefix("./").replace("/", ".")
-        raise ValueError(f"{kind} {name}: leave out .py: {dotted}:{attribute}")
-    called = FORM.match(name)
-    if called and name[called.end() :].startswith("("):
-        made = f"{attribute.partition('(')[0]}, {attribute.partition('(')[2]}".replace(", )", ")")
-        raise ValueError(
-            f"{kind} {name}: a name cannot hold numbers; write `mine = functools.partial({made}` "
-            f"into {module}.py and name {module}:mine"
-        )
-    if not FORM.fullmatch(name):
-        raise ValueError(f"{kind} must be named module:Name, such as my_parts:Mine, not {name!r}")
 
 
 def _import(kind: str, name: str, module_name: str) -> ModuleType:

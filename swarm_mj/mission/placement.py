@@ -38,7 +38,8 @@ def largest_part(position_m: Float[np.ndarray, "N 2"], range_m: float) -> Bool[n
             if num_members > num_most:
                 num_most = num_members
                 part[:] = False
-                part[members[:num_members]] = True
+                for n in range(num_members):
+                    part[members[n]] = True
     return part
 
 
@@ -70,12 +71,9 @@ def connected_positions(
         is_whole, is_kept = bool(np.all(part)), part & keeps_largest
         if is_whole:
             return position_m
-    reach = f"a range of {range_m:g} m"
-    if largest_part_at is not None:
-        reach += " in free space, and less in their channel,"
     raise ValueError(
-        f"no connected team in {num_draws} draws: {num_robots} robots with {reach} are too sparse "
-        f"for {_area(half_side_m)}; raise the range ratio or the density"
+        f"no connected team in {num_draws} draws: {num_robots} robots with a range of {range_m:g} "
+        f"m are too sparse for {_area(half_side_m)}; raise the range ratio or the density"
     )
 
 

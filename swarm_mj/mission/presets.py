@@ -5,7 +5,7 @@ from dataclasses import replace
 from functools import partial
 from typing import Any
 
-from swarm_mj.mission.specification import OPEN, Mission, Task
+from swarm_mj.mission.specification import NOTHING, OPEN, Mission, Task
 from swarm_mj.system.fields import as_typed
 
 
@@ -97,8 +97,16 @@ def radio_in_words(mission: Mission) -> str:
     return ", ".join(filter(None, (mission.beyond_free_space, *words)))
 
 
+def bits_per_second(rate: float) -> str:
+    """Return a bit rate in words, by the usual prefix."""
+    for prefix, unit in (("G", 1e9), ("M", 1e6), ("k", 1e3)):
+        if rate >= unit:
+            return f"{rate / unit:.4g} {prefix}bit/s"
+    return f"{rate:.4g} bit/s"
+
+
 def where_flown(mission: Mission) -> list[str]:
-    """Return arena and channel in words: a world by its preset, and what differs from it."""
+    """Return arena, channel, prior knowledge and bit rate in words; a world by its preset."""
     is_world, radio = mission.preset in WORLDS, radio_in_words(mission)
     usual = PRESETS[mission.preset]() if is_world else Mission()
     where = [f"preset {mission.preset}"] if is_world else []
@@ -106,6 +114,10 @@ def where_flown(mission: Mission) -> list[str]:
         where.append(f"arena {mission.arena}")
     if radio != radio_in_words(usual):
         where.append(radio or "free space")
+    if mission.prior_knowledge != NOTHING:
+        where.append(f"known {mission.prior_knowledge}")
+    if mission.bit_rate is not None:
+        where.append(bits_per_second(mission.bit_rate))
     return where
 
 

@@ -223,15 +223,10 @@ class Mission:
             raise ValueError(
                 f"prior knowledge must be nothing or some of {some}, not {self.prior_knowledge}"
             )
-        if self.physics == "exact" and self.arena != OPEN:
+        if self.physics == "exact" and (self.arena != OPEN or self.collide):
             raise ValueError(
-                f"exact physics knows no collisions, and arena {self.arena} has obstacles; choose "
-                "physics contact, or arena open"
-            )
-        if self.physics == "exact" and self.collide:
-            raise ValueError(
-                "exact physics knows no collisions, so robots cannot collide in it; choose "
-                "physics contact, or let them pass through each other"
+                "exact physics knows no collisions; choose physics contact, or arena open (it is "
+                f"{self.arena}) whose robots pass through each other"
             )
 
     @property

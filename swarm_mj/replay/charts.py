@@ -66,10 +66,7 @@ def dendrogram(
 def walk(
     parent: Sequence[int], robots: Iterable[int], root: int
 ) -> tuple[list[int], dict[int, list[int]]]:
-    """Return the root and robots in depth-first order, so that subtrees stay together.
-
-    Also return the robots' children, of whom the last comes first in the order.
-    """
+    """Return the root and robots in depth-first order, last children first, and the children."""
     children: dict[int, list[int]] = {}
     for k in robots:
         children.setdefault(parent[k], []).append(k)
@@ -81,16 +78,15 @@ def walk(
 
 
 def draw_age_matrix(out: RerunLog) -> None:
-    """Draw the ages of all pairs, in the order of a walk along the start's spanning tree.
-
-    So neighbours stand together, and clusters show as blocks.
-    """
+    """Draw the ages of all pairs; neighbours, along the start's spanning tree, stand together."""
     log, full_scale = out.log, out.log.facts.full_scale
     parent = spanning_tree(log.position_m[:1])[0].tolist()
     place = {robot: n for n, robot in enumerate(in_matrix(len(parent)))}
     order = [place[i] for i in walk(parent, range(len(parent)), ROOT)[0][1:] if i in place]
-    shares = np.minimum(log.age[:, order][:, :, order] / full_scale, 1.0)
-    shades = np.rint(OLDEST * shares).astype(np.uint8)
+    shown = np.ix_(order, order)
+    shades = np.empty((len(log.age), len(order), len(order)), dtype=np.uint8)
+    for k, age in enumerate(log.age):  # one by one: copies of all would take most of the memory
+        shades[k] = np.rint(OLDEST * np.minimum(age[shown] / full_scale, 1.0))
     ages = np.linspace(0.0, full_scale, OLDEST + 1)
     names = [f"{age:.0f} windows" for age in ages[:-1]] + [f"{full_scale:g} windows or more"]
     colours = palette.age_colours(ages, full_scale)
@@ -141,10 +137,7 @@ def _draw_classes(
 
 
 def radio_states(log: Log) -> Shaped[np.ndarray, "T N"]:
-    """Return the state of each robot's radio, by its name.
-
-    Sending goes before answering, answering before hearing.
-    """
+    """Return the radios' states by name: sending goes before answering, that before hearing."""
     robots = np.arange(log.recipient.shape[2])
     sends = log.is_transmitter
     hears = np.any(log.heard != robots, axis=1)
@@ -169,10 +162,7 @@ class PlotCurve(NamedTuple):
 
 
 def plots(log: Log) -> dict[str, list[PlotCurve]]:
-    """Return the plots of age, packets, mismatched links and the task's cost, as far as apply.
-
-    Their names say what the curves are: a legend would cover them.
-    """
+    """Return the plots that apply, by names that say what the curves are: legends hide some."""
     own = f"r{log.ego}"
     found = {
         f"Age of information [windows]: team ± std (green), {own} (white)": [

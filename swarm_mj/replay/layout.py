@@ -28,9 +28,6 @@ LAST = 5.1  # the height of the last row, with its texts
 LINE = 1.9  # of a text's second line, which they have beyond free space only
 BELOW = 2.6  # from a sample to its text
 NUM_SHADES = 60
-# What robots do with their radios, by `palette.BROADCAST_STATES` and `palette.ADDRESSED_STATES`.
-OF_BROADCASTS = "transmits (blue), hears (dark)"
-OF_ADDRESSED = "delivers (green), is lost (orange), answers (blue), overhears (pink)"
 
 Range: TypeAlias = tuple[float, float]
 
@@ -71,7 +68,9 @@ def layout(log: Log, ground: Ground) -> Layout:
         column_shares=[11, 10],
         name="Mission",
     )
-    states = OF_BROADCASTS if log.facts.is_broadcast else OF_ADDRESSED
+    states = "delivers (green), is lost (orange), answers (blue), overhears (pink)"
+    if log.facts.is_broadcast:
+        states = "transmits (blue), hears (dark)"
     across, up = ((-0.07 * size, 1.02 * size) for size in STATES)
     radio = rrb.Horizontal(
         _drawing("/", f"Radio of every robot: {states}", across, up, contents=["/state/**"]),

@@ -39,12 +39,6 @@ def with_digest(recorded: bytes) -> bytes:
     return recorded + _seal(memoryview(recorded))
 
 
-def has_digest(content: bytes) -> bool:
-    """Tell whether this is a replay as it was written, to the last bit."""
-    recorded = memoryview(content)[:-SEAL_BYTES]
-    return content.endswith(FOOTER) and content[-SEAL_BYTES:] == _seal(recorded)
-
-
 def _seal(recorded: memoryview) -> bytes:
     field = FIELD + hashlib.sha256(recorded).digest()
     header, footer = recorded[:HEADER_BYTES], recorded[-FOOTER_BYTES:]
@@ -57,13 +51,12 @@ def check_replay(path: Path) -> None:
     Rerun may crash over others, so they are kept from it.
     """
     with open_file(path, "replay") as file:
-        is_whole = has_digest(file.read())
-    if not is_whole and path.suffix.lower() != ".rrd":
-        raise ValueError(f"{path} is no .rrd file; `swarm-mj fly` records them")
-    if not is_whole:
+        content = file.read()
+    if content[-SEAL_BYTES:] != _seal(memoryview(content)[:-SEAL_BYTES]):
         raise ValueError(
             f"{path} is no whole replay: damaged, truncated, or not recorded by this version of "
-            f"swarm-mj; record it again, or see what `rerun {shlex.quote(str(path))}` makes of it"
+            "swarm-mj; record it again by `swarm-mj fly`, or see what "
+            f"`rerun {shlex.quote(str(path))}` makes of it"
         )
 
 
@@ -73,10 +66,7 @@ def windows(path: Path) -> Int[np.ndarray, "T"]:
 
 
 def read_footage(path: Path) -> Footage:
-    """Return what a video shows of a replay; raise as `check_replay` does.
-
-    Raise ValueError, too, for replays of earlier versions of swarm-mj.
-    """
+    """Return what a video shows; raise as `check_replay`, for replays of earlier versions, too."""
     check_replay(path)
     try:
         chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")

@@ -51,7 +51,7 @@ class ReplaySize(NamedTuple):
 
 # Of measured peaks, when a replay is written, and of files of teams that move; others' are smaller.
 # The age matrices are copied in memory and compressed in the file.
-IN_MEMORY = ReplaySize(base=0.1 * GB, window=15e3, robot=1e3, matrix=2.2)
+IN_MEMORY = ReplaySize(base=0.16 * GB, window=15e3, robot=750.0, matrix=3.3)
 ON_DISK = ReplaySize(base=0.5e6, window=800.0, robot=110.0, matrix=0.04)
 
 
@@ -210,10 +210,7 @@ class Recorder:
         )
 
     def _compared(self, is_on: Bool[np.ndarray, "T N"]) -> dict[str, Any]:
-        """Return the fields of a log that come from snapshots, each of which stands until the next.
-
-        In free space there are none.
-        """
+        """Return the fields of a log that come from snapshots, of which free space has none."""
         window = np.arange(1, len(is_on) + 1)[:: self._radio_stride]
         snapshots = self._snapshots[: len(window)]
         is_cut_off, mismatch = np.zeros_like(is_on), links.NO_MISMATCH
@@ -237,11 +234,9 @@ class Recorder:
 def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
     """Return one of a swarm's missions as it is now, with the packets of the window just flown.
 
-    Robots are coloured by what the observer knows of them. Raise ValueError if there is no such
-    mission or robot.
+    Robots are coloured by what the observer knows of them. Raise IndexError if there is no such
+    mission (those below 0 count from the end), ValueError if there is no such robot.
     """
-    if not 0 <= index < len(swarm.now):
-        raise ValueError(f"index must be from 0 to {len(swarm.now) - 1}, not {index}")
     recorder = Recorder(swarm, ego=observer, index=index)
     recorder.add()
     seen = recorder.log()

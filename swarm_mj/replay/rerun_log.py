@@ -45,8 +45,6 @@ LAYERS = {
     "arena/radio/range": EntityStyle(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
     "arena/world/unbelieved": EntityStyle(rr.LineStrips2D, None, 0.6, 2.0),
     "arena/world/too_weak": EntityStyle(rr.LineStrips2D, None, 0.5, 2.5),
-    "arena/world/others/unbelieved": EntityStyle(rr.LineStrips2D, None, 0.6, 2.0),
-    "arena/world/others/too_weak": EntityStyle(rr.LineStrips2D, None, 0.5, 2.5),
     "arena/belief/error": EntityStyle(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
     "arena/belief/ring": EntityStyle(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
     "arena/tree": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
@@ -71,8 +69,6 @@ LAYERS = {
     "scene/heading": EntityStyle(rr.LineStrips3D, palette.HEADING, 0.8),
     "scene/world/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
     "scene/world/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
-    "scene/world/others/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
-    "scene/world/others/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
     **{
         f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, style.colour, 1.0)
         for fate, style in PACKETS.items()
@@ -116,7 +112,7 @@ class RerunLog:
 
     def fixed_layer(self, path: str, **fields: Any) -> None:
         """Write things of a layer that never change, by the fields of the layer's archetype."""
-        layer = LAYERS[path]
+        layer = LAYERS[path.replace("others/", "")]  # others' links look like the observer's
         if layer.kind is rr.Points2D and path.startswith("arena"):
             layer = layer._replace(width=layer.width * self.scale)
         self.fixed(path, layer.kind.from_fields(**layer.style, **fields))
@@ -149,7 +145,7 @@ class RerunLog:
         window = self.log.mismatch.window
         per_snapshot = np.bincount(links["row"], minlength=len(window))
         colours = shades(path.rsplit("/")[-1], links)
-        columns = LAYERS[path].kind.columns(strips=lines_m, colors=colours)
+        columns = LAYERS[path.replace("others/", "")].kind.columns(strips=lines_m, colors=colours)
         values: dict[str, Any] = {name: links[name] for name in NUMBERS}
         numbers = rr.AnyValues.columns(**values)
         parts = (part for each in (columns, numbers) for part in each.partition(per_snapshot))

@@ -9,7 +9,6 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from swarm_mj.system.needs import LIBRARIES, Needs
 from swarm_mj.system.processes import PYTHON, running
 
 if TYPE_CHECKING:  # what draws is slow to import
@@ -27,14 +26,6 @@ LONGEST_S, SHORTEST_S = 10.0, 1.0  # unless given
 GIF = ".gif"
 TICKS_HZ = 100  # a GIF counts in hundredths of a second
 MIN_TICKS = 2  # viewers show what is shorter much longer
-MAX_MISSIONS = 2  # side by side
-
-# Fits of measured peaks and files.
-DRAWING_BYTES = 3.0 * LIBRARIES  # of MuJoCo, OpenGL and the encoder
-PIXEL_BYTES = 130.0  # of their buffers
-KEPT_PIXEL_BYTES = 1.5  # of each picture of a GIF
-FILE_BYTES = 0.1e6
-FILE_PIXEL_BYTES = 0.05  # of each picture
 
 
 def quiet_environment() -> dict[str, str]:
@@ -108,31 +99,13 @@ DEFAULTS = {".mp4": VideoStyle(), GIF: VideoStyle(width=830, height=520, fps=15)
 
 
 def fitted(style: VideoStyle, suffix: str) -> VideoStyle:
-    """Adapt a style to a kind of file: a GIF's pictures last whole hundredths of a second.
-
-    Raise ValueError for more pictures per second than a GIF can show.
-    """
+    """Adapt a style to a kind of file: a GIF's pictures last whole hundredths of a second."""
     if suffix != GIF:
         return style
-    max_fps = TICKS_HZ // MIN_TICKS
-    if style.fps > max_fps:
-        raise ValueError(
-            f"fps of a GIF must be at most {max_fps}, not {style.fps:g}; or make an MP4"
-        )
-    return replace(style, fps=TICKS_HZ / round(TICKS_HZ / style.fps))
+    return replace(style, fps=TICKS_HZ / max(MIN_TICKS, round(TICKS_HZ / style.fps)))
 
 
 def default_seconds(footages: "Sequence[Footage]") -> float:
     """Return the missions' own time, if that is neither short nor long."""
     flown_s = max(len(each.window) * each.facts.mission.window_s for each in footages)
     return min(LONGEST_S, max(SHORTEST_S, flown_s))
-
-
-def video_needs(width: int, height: int, num_pictures: int | float, suffix: str) -> Needs:
-    """Return what `replay --video` takes; a GIF's pictures are kept until the last is drawn."""
-    pixels = width * height
-    kept = num_pictures if suffix == GIF else 0.0
-    return Needs(
-        memory=DRAWING_BYTES + (PIXEL_BYTES + KEPT_PIXEL_BYTES * kept) * pixels,
-        file=FILE_BYTES + FILE_PIXEL_BYTES * num_pictures * pixels,
-    )

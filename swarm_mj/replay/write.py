@@ -11,7 +11,8 @@ import numpy as np
 import rerun as rr
 import rerun_bindings as bindings
 
-from swarm_mj.protocol.packets import BITS_PER_BYTE, bits_per_second
+from swarm_mj.mission.presets import bits_per_second
+from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.replay import charts, palette
 from swarm_mj.replay.footage import frame
 from swarm_mj.replay.layout import draw_legend, layout
@@ -67,10 +68,7 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
 
 
 def _application(log: Log) -> str:
-    """Return the name of a kind of replay.
-
-    Of replays with one name that are opened together, rerun gives all the layout of the last.
-    """
+    """Return the name of a kind of replay: rerun gives all of one name the layout of the last."""
     mission = log.facts.mission
     packets = "broadcasts" if log.facts.is_broadcast else "addressed packets"
     parts = [mission.task, f"{mission.num_robots} robots", f"{mission.side_m:.0f} m", packets]

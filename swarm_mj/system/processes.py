@@ -77,7 +77,9 @@ def running(
                 os.killpg(process.pid, signal.SIGKILL)
 
 
-def attempt(program: str, variables: Mapping[str, str] | None = None) -> tuple[bool, str]:
+def attempt(
+    program: str, variables: Mapping[str, str] | None = None, *, longest_s: float = LONGEST_S
+) -> tuple[bool, str]:
     """Run a Python program; return whether it ends well, and the last line that it said.
 
     It has a process of its own, with these environment variables: it may crash or hang, and what
@@ -89,9 +91,9 @@ def attempt(program: str, variables: Mapping[str, str] | None = None) -> tuple[b
         running(command, environment=environment, output=said) as process,
     ):
         try:
-            works = process.wait(LONGEST_S) == 0
+            works = process.wait(longest_s) == 0
         except subprocess.TimeoutExpired:
-            return False, f"not within {LONGEST_S:g} s"
+            return False, f"not within {longest_s:g} s"
         said.seek(0)
         lines = said.read().strip().splitlines()
     return works, lines[-1] if lines else "it said nothing"

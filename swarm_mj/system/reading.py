@@ -24,29 +24,26 @@ Row = tuple[int, dict[str, str]]
 MAX_LETTERS = 160  # of what msgspec says
 
 
-def open_file(path: Path, what: str, *, folder: Path | None = None) -> BinaryIO:
+def open_file(path: Path, what: str) -> BinaryIO:
     """Open a regular file, at once: pipes and devices would be waited for, or have no end.
 
-    Raises ValueError if it cannot be read, or a link leads out of the folder where it must be.
+    Raises ValueError if it cannot be read.
     """
     try:
-        if folder is not None and not path.resolve().is_relative_to(folder.resolve()):
-            raise ValueError(f"{what} {path} is a link that leads out of {folder}; copy the file")
         number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except FileNotFoundError:
-        raise ValueError(f"there is no {what} {path}") from None
-    except (OSError, RuntimeError) as error:  # RuntimeError: Python 3.11 and 3.12, of link loops
-        reason = getattr(error, "strerror", None) or "its links lead in a circle"
-        raise ValueError(f"{what} {path} cannot be read: {reason}") from error
+        raise ValueError(f"{what} {path} cannot be found") from None
+    except OSError as error:
+        raise ValueError(f"{what} {path} cannot be read: {error.strerror}") from error
     if not stat.S_ISREG(os.fstat(number).st_mode):
         os.close(number)
         raise ValueError(f"{what} {path} is a folder, a pipe or a device; name a file")
     return os.fdopen(number, "rb")
 
 
-def read_file(path: Path, what: str, most_bytes: int, *, folder: Path | None = None) -> bytes:
+def read_file(path: Path, what: str, most_bytes: int) -> bytes:
     """Return all that a file holds; raise ValueError, as `open_file` does, or if that is more."""
-    with open_file(path, what, folder=folder) as file:
+    with open_file(path, what) as file:
         size = os.fstat(file.fileno()).st_size
         content = b"" if size > most_bytes else file.read(most_bytes + 1)
     check_size(f"{what} {path}", max(size, len(content)), most_bytes)

@@ -121,8 +121,8 @@ def owned(path: Path) -> Iterator[None]:
     ones are removed in the end.
 
     Raises:
-        ValueError: Another process owns it, or something else has the hidden file's name.
-        OSError: The folder cannot be written.
+        ValueError: Another process owns it.
+        OSError: The folder, or the hidden file, cannot be written.
     """
     target = path.resolve()
     made = [folder for folder in target.parents if not folder.exists()]
@@ -154,15 +154,7 @@ def _check_place(what: str, path: Path, *, must_be_new: bool) -> None:
 def _locked(lock: Path, path: Path) -> int:
     """Return the hidden file, open and locked, if the disk knows locks."""
     while True:
-        try:
-            number = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-        except OSError as error:
-            if not os.path.lexists(lock):
-                raise
-            raise ValueError(
-                f"{path} cannot be locked: {error.strerror}; unless it is being written, "
-                f"remove {lock}"
-            ) from error
+        number = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
         try:
             fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
         except BlockingIOError:

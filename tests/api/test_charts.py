@@ -33,6 +33,11 @@ def test_a_flight_is_drawn_window_by_window():
     assert tuple(age.figure.get_size_inches()) == pytest.approx((7.5, 1.1 + 2 * 2.1))
 
 
+def test_a_random_walk_has_no_velocity_variance_below_its_age():
+    (age,) = swarm_mj.fly("random-walk", policy="tdma", record=False, **SHORT).plot().axes
+    assert "age" in age.get_ylabel()
+
+
 def test_a_team_at_rest_has_no_velocities_and_a_notebook_shows_its_chart_once(monkeypatch):
     run = swarm_mj.fly("stationary", policy="tdma", record=False, **SHORT)
     (age,) = run.plot().axes

@@ -124,7 +124,7 @@ def test_a_study_has_a_batch_in_each_process_while_batches_last():
     study = Study(policies=("tdma", "gossip"), regimes=regimes, episodes=50)
     one, two, many = (module.study_needs(study, jobs).memory for jobs in (1, 2, 256))
     each = two - one
-    assert each == pytest.approx(LIBRARIES + 60 * 25 * 100**2)
+    assert each == pytest.approx(LIBRARIES + 8500 * 100 + 57 * 25 * 100**2)
     assert many == pytest.approx(one + 7 * each)  # 2 regimes, 2 policies, 2 batches of 25
 
 

@@ -59,8 +59,11 @@ def test_trails_end_at_the_robots_and_a_team_at_rest_has_none(run):
     assert np.array_equal(first[0], run.log.position_m[0, 5])
     assert np.array_equal(last[-1], run.log.position_m[19, 5])
     assert trails[0].get_alpha() < trails[-1].get_alpha()
-    still = swarm_mj.fly("stationary", policy="mst", num_robots=4, num_windows=3, range_ratio=2.0)
-    assert of_kind(still.picture().axes[0], LineCollection) == []
+    small = {"policy": "mst", "num_robots": 4, "num_windows": 3, "range_ratio": 2.0}
+    for task in ("stationary", "flocking"):  # which moves less than a robot's size so soon
+        still = swarm_mj.fly(task, **small).picture()
+        assert of_kind(still.axes[0], LineCollection) == []
+        assert "trail" not in " ".join(each.get_text() for each in still.legends[0].get_texts())
 
 
 def test_packets_heard_in_the_window_are_arrows(run):
@@ -91,10 +94,10 @@ def test_a_replay_that_is_read_back_gives_the_same_picture(run, tmp_path):
 
 
 def test_obstacles_and_the_channel_are_shown():
-    city = {"preset": "urban", "num_robots": 20, "num_windows": 2}
+    city = {"preset": "urban", "num_robots": 20, "num_windows": 2, "bit_rate": 1e6}
     figure = swarm_mj.fly("random-walk", policy="gossip", **city).picture()
     assert len(of_kind(figure.axes[0], Polygon)) == 16  # blocks, 4 by 4
-    assert "preset urban" in texts(figure)
+    assert "preset urban, 1 Mbit/s" in texts(figure)
 
 
 def test_obstacles_are_drawn_without_rerun():

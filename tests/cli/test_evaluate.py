@@ -54,6 +54,16 @@ def test_all_is_every_policy_after_those_named():
     assert study("--policy", "all", "--policy", "mst").policies == ("mst", *others)
 
 
+@pytest.mark.parametrize(("task", "is_told"), [("random-walk", True), ("stationary", False)])
+@pytest.mark.parametrize("command", ["fly --no-record", "evaluate --episodes 2"])
+def test_a_planner_without_payload_that_moves_is_said_to_be_spatial_tdma(
+    succeed, command, task, is_told
+):
+    asked = ("--policy", "planner", "--payload", "none", "--task", task)
+    said = succeed(*command.split(), *SMALL, *asked).stderr
+    assert ("planner --payload none flies as spatial-tdma where robots move" in said) == is_told
+
+
 def test_the_planner_flies_without_payload_under_a_name_of_its_own():
     alone = "planner --payload none"
     named = study("--policy", "tdma", "planner", "--payload", "none", "--baseline", "planner")

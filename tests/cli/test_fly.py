@@ -82,8 +82,8 @@ REFUSED = {
     "--policy tdma --bit-rate 2k": "16 bytes for a single entry, but a slot holds 12 bytes at",
     "--rician-k -1": "Rician K must be a number from 0 to 10000 [1], not -1",
     "--arena blocks --physics exact": "choose physics contact, or arena open",
-    "--preset urban --physics exact": "arena blocks has obstacles; choose physics contact, or",
-    "--collide --physics exact": "exact physics knows no collisions, so robots cannot",
+    "--preset urban --physics exact": "choose physics contact, or arena open (it is blocks)",
+    "--collide --physics exact": "exact physics knows no collisions; choose physics",
 }
 
 
@@ -187,6 +187,14 @@ def test_the_next_commands_fit_the_mission_and_the_screen(monkeypatch):
     for line in told.values():
         run, _ = parse(shlex.split(line)[1:])
         assert callable(run)
+
+
+def test_policies_whose_packets_do_not_fit_are_not_suggested():
+    """Of 9 robots the planner's packets have 525 bytes; a slot holds 312 at 50 kbit/s, then 625."""
+    for rate, names in ((50e3, "mst tdma random-flooding"), (100e3, "mst planner tdma random-")):
+        mission = paper("random-walk", num_robots=9, bit_rate=rate)
+        options = fly.FlyOptions(mission=mission, policy="mst")
+        assert f" --policy {names}" in dict(fly._next_commands(options, None))["Compare some:"]
 
 
 def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(here, monkeypatch, capsys):

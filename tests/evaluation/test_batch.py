@@ -32,7 +32,7 @@ def small(task="random-walk", **overrides):
 
 
 def batch(mission, policy="mst", seeds=SEEDS, probability=0.3):
-    return Batch(policy=policy, probability=probability, mission=mission, seeds=seeds)
+    return Batch(policy=policy, how={"probability": probability}, mission=mission, seeds=seeds)
 
 
 def active(swarm):

@@ -92,17 +92,10 @@ def test_the_figures_are_the_papers():
 
 @pytest.mark.parametrize("preset", ["paper", "reference"])
 @pytest.mark.parametrize("figure", RESULT_FIGURES.values(), ids=lambda figure: figure.name)
-def test_the_command_named_evaluates_the_drawn_policies_in_the_figures_regimes(figure, preset):
+def test_the_command_named_evaluates_the_figures_regimes(figure, preset):
     program, *arguments = shlex.split(figure.command(preset))
     study = parse(arguments)[1].study
     assert program == "swarm-mj"
-    left_out = {"csma", "sotdma"}
-    if preset == "reference":
-        left_out |= {"planner", "planner --payload none", "gnn"}
-    if figure.task != "stationary":  # there it is spatial-tdma
-        left_out |= {"planner --payload none"}
-    assert set(study.policies) == set(POLICIES) - left_out
-    assert study.compared_to == "tdma"
     assert {regime.preset for regime in study.regimes} == {preset}
     assert {regime.task for regime in study.regimes} == {figure.task}
     assert all("aoi" in published("mst", regime) for regime in study.regimes)

@@ -95,6 +95,30 @@ def test_the_freshest_comes_first_in_each_regime(printed):
     assert sum("preset paper: 1 robots" in line for line in lines) == 2
 
 
+def test_titles_of_teams_at_rest_say_how_they_move_only_if_that_was_asked_for(printed):
+    at_rest = {"task": "stationary", "velocity_ratio": 0.15, "boundary": "reflect"}
+    moving = at_rest | {"task": "random-walk"}
+    for traits, is_said in (
+        (at_rest, False),
+        (at_rest | {"boundary": "none"}, True),
+        (moving, True),
+    ):
+        text = "\n".join(printed([some_result("a", 3.0, **traits)], 100))
+        assert ("velocity ratio 0.15" in text, f"boundary {traits['boundary']}" in text) == (
+            is_said,
+            is_said,
+        )
+        assert "1 windows of paper physics" in text
+
+
+def test_policies_are_named_under_which_most_missions_ended_before_all_had_heard_of_all(printed):
+    shares = {"mst": 0.25, "tdma": 0.5, "gossip": 0.0}
+    results = [some_result(name, 3.0, complete_share=share) for name, share in shares.items()]
+    said = "missions that ended with everyone having heard of everyone: mst 25%, gossip 0%"
+    assert said in printed(results, 100, is_wide=False)
+    assert "at last" not in "\n".join(printed(results[1:2], 100))
+
+
 def rows(lines, policy):
     """The words of both lines of a policy's row."""
     first = next(index for index, line in enumerate(lines) if line.startswith(policy))

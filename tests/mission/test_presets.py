@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarm_mj.mission import PRESETS, WORLDS, paper, reference
-from swarm_mj.mission.presets import where_flown
+from swarm_mj.mission.presets import bits_per_second, where_flown
 from swarm_mj.physics.arenas import LOSS_DB
 from swarm_mj.radio.free_space import path_loss_db
 
@@ -46,7 +46,7 @@ def test_only_a_flock_flies_without_walls(preset):
 def test_robots_that_collide_fly_in_contact_physics(preset):
     assert preset(collide=True).physics == "contact"
     assert preset(collide=False).physics == "exact"
-    with pytest.raises(ValueError, match=r"so robots cannot collide in it; choose physics contact"):
+    with pytest.raises(ValueError, match=r"choose physics contact, or .* pass through each other"):
         preset(collide=True, physics="exact")
 
 
@@ -102,3 +102,8 @@ def test_where_a_world_is_flown_names_only_what_was_changed():
         (free | {"fading": "none"}, "free space"),
     ):
         assert ", ".join(where_flown(PRESETS["urban"](**given))) == f"preset urban, {said}"
+
+
+def test_rates_are_said_with_the_usual_prefix():
+    said = [bits_per_second(rate) for rate in (12.0, 250e3, 1.5e6, 6e9)]
+    assert said == ["12 bit/s", "250 kbit/s", "1.5 Mbit/s", "6 Gbit/s"]

@@ -10,12 +10,16 @@ from rerun.chunk import RrdReader
 from swarm_mj.replay.read import (
     SEAL_BYTES,
     check_replay,
-    has_digest,
     read_footage,
     windows,
     with_digest,
 )
 from swarm_mj.replay.write import write_replay
+
+
+def refuse(path):
+    with pytest.raises(ValueError, match="no whole replay"):
+        check_replay(path)
 
 
 def test_windows_are_the_flight_s(replay, two_way):
@@ -36,8 +40,8 @@ def test_what_is_no_whole_replay_is_refused(replay, tmp_path, change):
     ("name", "complaint"),
     [
         ("a b.rrd", r"`rerun '/.*a b\.rrd'`"),  # can be pasted
-        ("fading.py", r"fading.py is no .rrd file; `swarm-mj fly` records them"),
-        ("missing.rrd", "there is no replay"),
+        ("fading.py", r"fading.py is no whole replay: .* record it again by `swarm-mj fly`"),
+        ("missing.rrd", "cannot be found"),
     ],
 )
 def test_a_complaint_names_the_file_and_the_way_out(tmp_path, name, complaint):
@@ -64,7 +68,7 @@ def bare(replay, tmp_path):
 
 def test_it_is_the_sha256_of_what_rerun_wrote(replay, bare):
     assert hashlib.sha256(bare.read_bytes()).digest() in replay.read_bytes()[-SEAL_BYTES:]
-    assert not has_digest(bare.read_bytes())
+    refuse(bare)
     assert with_digest(bare.read_bytes()) == replay.read_bytes()
 
 
@@ -76,13 +80,14 @@ def test_rerun_reads_the_same(replay, bare):
         assert len(ours.blueprints()) == len(theirs.blueprints()) == 1
 
 
-def test_every_byte_counts(replay):
+def test_every_byte_counts(replay, tmp_path):
     """Those of the digest itself, of the first block, and of what is between."""
     whole = bytearray(replay.read_bytes())
     places = [*range(200), *range(len(whole) - SEAL_BYTES - 200, len(whole))]
     for place in [*places, *range(200, len(whole), 9973)]:
         whole[place] ^= 1
-        assert not has_digest(bytes(whole)), place
+        (tmp_path / "other.rrd").write_bytes(whole)
+        refuse(tmp_path / "other.rrd")
         whole[place] ^= 1
 
 
@@ -91,4 +96,4 @@ def test_what_rerun_did_not_write_to_its_end_gets_none(bare, num_bytes):
     bare.write_bytes(bare.read_bytes()[:num_bytes])
     with pytest.raises(OSError, match=r"did not record .* to its end"):
         with_digest(bare.read_bytes())
-    assert not has_digest(bare.read_bytes())
+    refuse(bare)

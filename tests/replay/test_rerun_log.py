@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 from reading import column, entities, static
 
+from swarm_mj.replay.palette import MISMATCH
 from swarm_mj.replay.rerun_log import LAYERS
 from swarm_mj.replay.write import write_replay
 
@@ -28,7 +29,9 @@ def test_every_layer_is_drawn_by_some_mission_and_nothing_else(
     write_replay(replace(log, facts=facts), {"seed": 5}, tmp_path / "free.rrd")
     paths = (replay, flood_replay, blocked_replay, tmp_path / "free.rrd")
     found = {entity for path in paths for entity in entities(path) if entity.startswith(DRAWN)}
-    assert {entity.removeprefix("/") for entity in found} - OTHERS == set(LAYERS)
+    links = {f"/{view}/world/others/{kind}" for view in ("arena", "scene") for kind in MISMATCH}
+    assert links <= found  # drawn as the observer's
+    assert {entity.removeprefix("/") for entity in found - links} - OTHERS == set(LAYERS)
 
 
 def test_the_ground_lies_below_beliefs_these_below_packets_and_these_below_robots():

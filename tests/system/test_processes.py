@@ -6,7 +6,6 @@ import time
 
 import pytest
 
-from swarm_mj.system import processes
 from swarm_mj.system.processes import attempt, guard, running
 
 # Starts a child of its own, says that it has, and waits for it.
@@ -61,10 +60,9 @@ def test_what_is_guarded_outlasts_the_block():
         ("import os; print(os.environ['SAID'])", (True, "by its variables")),
     ],
 )
-def test_what_came_of_an_attempt(monkeypatch, program, outcome):
-    if "sleep" in program:
-        monkeypatch.setattr(processes, "LONGEST_S", 0.3)
-    assert attempt(program, {"SAID": "by its variables"}) == outcome
+def test_what_came_of_an_attempt(program, outcome):
+    longest_s = 0.3 if "sleep" in program else 120.0
+    assert attempt(program, {"SAID": "by its variables"}, longest_s=longest_s) == outcome
 
 
 def test_an_attempt_runs_nothing_of_the_folder_here(trapped):

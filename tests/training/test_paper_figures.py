@@ -11,6 +11,7 @@ from synthetic import result
 from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import points, published
 from swarm_mj.evaluation.results import read_results, write_results
+from swarm_mj.policies.registry import POLICIES
 
 NAMES = [
     f"{preset}-{task}.csv"
@@ -51,6 +52,14 @@ def test_the_commands_cover_every_published_regime(calls, settings):
     assert experiment.evaluate(settings, 3, force=False) == 0
     studies = [parse(arguments)[1].study for arguments in calls.seen]
     assert all((study.episodes, study.seed) == (50, 2000) for study in studies)
+    for study in studies:
+        left_out = {"csma", "sotdma"}
+        if study.regimes[0].preset == "reference":
+            left_out |= {"planner", "planner --payload none", "gnn"}
+        if study.regimes[0].task != "stationary":  # there it is spatial-tdma
+            left_out |= {"planner --payload none"}
+        assert set(study.policies) == set(POLICIES) - left_out
+        assert study.compared_to == "tdma"
     found = [
         (regime.preset, point)
         for study in studies

@@ -44,10 +44,7 @@ def unusable(error: Exception) -> OSError:
 
 
 def check_choice() -> str:
-    """Return MUJOCO_GL in lower case; raise ValueError if MuJoCo has no such back end.
-
-    With such a name, MuJoCo could not even be imported.
-    """
+    """Return MUJOCO_GL in lower case; raise ValueError for a name by which MuJoCo cannot load."""
     chosen = os.environ.get(CHOICE, "").lower().strip()
     if chosen and chosen not in (*NAMES, *ON, *OFF):
         raise ValueError(

@@ -21,7 +21,6 @@ from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.rendering import markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
 
-MAX_PIXELS = 4096  # of a picture's side
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
 TILE_M = 200.0  # the floor's texture, two squares by two, assets/arena.xml
 GROUND = 10.0  # an open floor's side, by the area's: a team that flies apart has left the area
@@ -46,11 +45,8 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
     ) -> None:
         """Compile the scene, changed by `scene`, for pictures of this size [pixels].
 
-        Raise ValueError for a size outside its range, and OSError if no OpenGL works here.
+        Raise OSError if no OpenGL works here.
         """
-        for what, pixels in (("width", width), ("height", height)):
-            if not 16 <= pixels <= MAX_PIXELS:
-                raise ValueError(f"{what} must be from 16 to {MAX_PIXELS} pixels, not {pixels}")
         self._size, self._mission = (width, height), mission
         self._model = pictured(mission, scene, width, height)
         self._data = MjData(self._model)
@@ -75,14 +71,8 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
         return markers.look_at(footage.ground, row, *self._size)
 
     def frame(self, footage: Footage, row: int = 0) -> UInt8[np.ndarray, "H W 3"]:
-        """Return the picture of a window, counted from 0: RGB, its first row on top.
-
-        Raise ValueError for another team size.
-        """
-        num, (width, height) = footage.position_m.shape[1], self._size
-        if num != self._mission.num_robots:
-            raise ValueError(f"footage must have {self._mission.num_robots} robots, not {num}")
-        data = self._data
+        """Return the picture of a window, counted from 0: RGB, its first row on top."""
+        (width, height), data = self._size, self._data
         data.qpos[:] = footage.position_m[row].ravel()
         functions.mj_kinematics(self._model, data)
         functions.mj_comPos(self._model, data)

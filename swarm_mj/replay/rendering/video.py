@@ -20,7 +20,7 @@ from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rendering import drawing
 from swarm_mj.replay.rendering.scene import SceneRenderer
-from swarm_mj.replay.view import DEFAULTS, GIF, MAX_MISSIONS, VideoStyle, fitted
+from swarm_mj.replay.view import DEFAULTS, GIF, VideoStyle, fitted
 
 Picture = UInt8[np.ndarray, "H W 3"]
 
@@ -37,13 +37,10 @@ class Movie(ExitStack):
     """The pictures of a video; a context that gives OpenGL's memory back."""
 
     def __init__(self, footages: Sequence[Footage], style: VideoStyle) -> None:
-        """Prepare everything that does not move, of one mission or of two side by side.
-
-        Raise ValueError for any other number, and OSError if no OpenGL works here.
-        """
+        """Prepare everything that does not move; raise as `make_video` does."""
         super().__init__()
-        if not 1 <= len(footages) <= MAX_MISSIONS:
-            raise ValueError(f"a video shows 1 or {MAX_MISSIONS} missions, not {len(footages)}")
+        if not 1 <= len(footages) <= len(STRIPS):
+            raise ValueError(f"a video shows 1 or {len(STRIPS)} missions, not {len(footages)}")
         # One scale for both: by it the fresher team is seen in full, and the other is older still.
         scale = min(each.facts.full_scale for each in footages)
         self._footages = [
@@ -111,8 +108,7 @@ def make_video(
     """Return the file of a video of one mission, or of two side by side.
 
     Footages are logs, or from `read_footage`; `on_picture` is called after each picture.
-    Raise ValueError for more missions, another suffix, or more pictures per second than a GIF can
-    show, and OSError if no OpenGL works here.
+    Raise ValueError for more missions or another suffix, and OSError if no OpenGL works here.
     """
     if suffix not in DEFAULTS:
         raise ValueError(f"a video is {' or '.join(DEFAULTS)}, not {suffix}")
@@ -146,13 +142,10 @@ def encode_mp4(pictures: Iterable[Picture], style: VideoStyle) -> bytes:
 
 
 def encode_gif(pictures: Iterable[Picture], style: VideoStyle, samples: Sequence[Picture]) -> bytes:
-    """Return a GIF that starts over and over; its colours are those of the samples.
-
-    What fills little of a picture, such as lost packets, has its colour, too.
-    """
+    """Return a GIF that starts over and over; its colours are those of the samples."""
     pixels = np.concatenate([sample.reshape(-1, 3) for sample in samples]).astype(np.int32)
     packed, counts = np.unique(pixels @ (1 << 16, 1 << 8, 1), return_counts=True)
-    # By the roots of their numbers, so that the dark ground does not take all of them.
+    # By the roots of their numbers: the dark ground does not take all, and lost packets have one.
     repeated = np.repeat(packed, np.ceil(np.sqrt(counts)).astype(int))
     rgb = np.stack([repeated >> shift & 255 for shift in (16, 8, 0)], axis=-1)
     montage = Image.fromarray(rgb[None].astype(np.uint8))

@@ -102,17 +102,6 @@ def test_two_renderers_do_not_disturb_each_other():
         np.testing.assert_array_equal(first.frame(seen), alone)
 
 
-def test_wrong_sizes_and_teams_are_named():
-    mission = paper(num_robots=3)
-    with pytest.raises(ValueError, match="height must be from 16 to 4096 pixels, not 5"):
-        SceneRenderer(mission, 640, 5)
-    with (
-        SceneRenderer(mission, 64, 64) as renderer,
-        pytest.raises(ValueError, match="footage must have 3 robots, not 2"),
-    ):
-        renderer.frame(moment([(0.0, 0.0), (1.0, 1.0)]))
-
-
 def test_a_back_end_that_turns_out_not_to_work_is_one_line(monkeypatch):
     def refuse(*_):
         raise FatalError("no context")

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.radio.power_law import PowerLaw, write_powers
-from swarm_mj.radio.reception import NOBODY, Air, add_to_air, decoded, incoming_at
+from swarm_mj.radio.reception import NOBODY, Air, add_to_air, incoming_at, is_received, sinr
 from swarm_mj.system.compiled import compiled
 
 
@@ -52,4 +52,6 @@ def predict_receptions(
 def decoded_by(j: int, predicted: PredictedReceptions, more: float, threshold: float) -> int:
     """Return whom j decodes beside this additional interference, or `NOBODY`."""
     incoming = incoming_at(Air(predicted.total, predicted.strongest, predicted.sender), j)
-    return decoded(incoming, NOBODY, 1.0, threshold, more=more)
+    interference = incoming.total - incoming.strongest + more
+    is_decoded = is_received(sinr(incoming.strongest, interference, 1.0), threshold)
+    return incoming.sender if is_decoded else NOBODY

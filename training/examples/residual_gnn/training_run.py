@@ -31,7 +31,6 @@ from swarm_mj.system.fields import check, setting
 from swarm_mj.system.writing import write_bytes, write_csv
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
-MAX_BYTES = 100_000_000
 FIRST_PLACE = 30_000  # seeds of the places where training flies
 HELD_OUT_SEED = 500_000  # of missions that judge
 CHOICE_SEED = 510_000  # of those that choose among the best
@@ -249,7 +248,7 @@ class Run:
 
     def _load(self) -> None:
         path = self._folder / CHECKPOINT
-        state: Any = read_torch(path, MAX_BYTES)
+        state: Any = read_torch(path)
         try:
             if state["settings"] != repr(self.training):
                 raise ValueError("it was made with other settings")
