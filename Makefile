@@ -128,6 +128,7 @@ figures: setup
 	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig4 fig5 fig6 --policy $(OURS) \
 	  --out assets/figures/policies --force
 	$(BIN)/python training/readme_figure.py
+	$(BIN)/python training/large_teams_figure.py
 	$(BIN)/python training/learning_figure.py
 	$(BIN)/python training/stability_figure.py
 	$(BIN)/python tools/diagrams.py
@@ -146,6 +147,7 @@ picture: setup
 # Material's own notice about a coming version of MkDocs would be the only warning.
 docs docs-serve: export NO_MKDOCS_2_WARNING = 1
 docs: $(DEV)
+	@echo "Building the site; it runs the tour, a minute or two ..."
 	$(BIN)/mkdocs build --strict --quiet $(ARGS)
 	@echo "site/index.html"
 

@@ -17,7 +17,7 @@ from statistics import mean
 from swarm_mj.cli import script
 from swarm_mj.evaluation.published import SWEEPS
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, read_results
-from swarm_mj.protocol.packets import bits_per_second
+from swarm_mj.mission.presets import bits_per_second
 from swarm_mj.system.fields import setting
 
 COSTS = {
