@@ -120,8 +120,7 @@ def compute_powers(powers: MeanPowers, b: int, i: int, waves: Waves | None = Non
 @compiled()
 def powers_between(position_m: Float[np.ndarray, "N 2"], law: PowerLaw) -> Float[np.ndarray, "N N"]:
     """Return the mean power of every i at every j."""
-    num_robots = position_m.shape[0]
-    power = np.empty((num_robots, num_robots))
-    for i in range(num_robots):
+    power = np.empty((position_m.shape[0], position_m.shape[0]))
+    for i in range(power.shape[0]):
         write_powers(i, position_m, law, power[i])
     return power

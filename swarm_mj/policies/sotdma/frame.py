@@ -7,15 +7,20 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int, Int32, UInt64
+from jaxtyping import Bool, Float, Int, UInt64
 
-from swarm_mj.radio.reception import Incoming, add_packet, decoded
+from swarm_mj.protocol.timestamps import merge_timestamps, observe_own
+from swarm_mj.radio.reception import add_to_air, decoded, incoming_at, silent_air
 from swarm_mj.radio.spatial_reuse import NOISE
 from swarm_mj.system.compiled import compiled
 
 SLOTS_PER_ROOT = 3.2  # of the number of robots, chosen as the numbers of `Rule`
-Known = UInt64[np.ndarray, "F"]  # a bit for each robot of a word, in the trial of each slot
+Known = UInt64[np.ndarray, "C"]  # a bit for each robot of a word, in the trial of each slot
+Words = UInt64[np.ndarray, "R C"]  # rows of them
+Heard = Int[np.ndarray, "F N"]  # the sender that j decodes in each slot; j itself: none
+Marks = Bool[np.ndarray, "F N"]  # who counts as deaf to one robot in each slot
 NOWHERE = -1  # the slot of a robot that does not transmit
+TIE = 1e-8  # mean ages that differ by less are equal [slots]
 WORD = 64  # robots whose news spreads together, a bit each
 
 
@@ -76,15 +81,15 @@ def empty_frame(power: Float[np.ndarray, "N N"], rule: Rule) -> Frame:
 @compiled()
 def switch(frame: Frame, s: int, k: int) -> None:
     """Let k transmit in a slot, or no longer, and write what sender each decodes (Eqs. 3-4)."""
-    power, heard = frame.power, frame.heard[s]
+    num_robots, rule, air = frame.slot.shape[0], frame.rule, silent_air(frame.slot.shape[0])
     frame.slot[k] = NOWHERE if frame.slot[k] == s else s
-    senders = np.flatnonzero(frame.slot == s)
-    for j in range(power.shape[0]):
-        incoming = Incoming(0.0, 0.0, j)
-        for i in senders:
-            incoming = add_packet(incoming, int(i), power[i, j], power[i, j])
-        heard[j] = decoded(incoming, j, NOISE, frame.rule.threshold, factor=frame.rule.interference)
-    heard[senders] = senders
+    for i in range(num_robots):
+        for j in range(num_robots if frame.slot[i] == s else 0):
+            signal = 0.0 if frame.slot[j] == s else frame.power[i, j]
+            add_to_air(air, i, j, signal, frame.power[i, j])
+    for j in range(num_robots):
+        incoming = incoming_at(air, j)
+        frame.heard[s, j] = decoded(incoming, j, NOISE, rule.threshold, rule.interference)
 
 
 @compiled()
@@ -98,105 +103,111 @@ def _count(bits: np.uint64) -> np.int64:
 
 
 @compiled()
-def _learn(mine: Known, sent: Known, tried: Known, s: int) -> bool:
-    """Add what is heard in slot s, and `tried` in the trial of s; return whether any is news."""
-    in_trial = mine[s] | tried[s]
-    news = in_trial ^ mine[s]
-    for t in range(mine.shape[0]):
-        news |= sent[t] & ~mine[t]
-        mine[t] |= sent[t]
-    mine[s] = in_trial
-    return bool(news != 0)
+def _learn(mine: Known, sent: Known, tried: Known, s: int, num_slots: int, news: Known) -> bool:
+    """Add what is heard in slot s, and `tried` in the trial of s; return whether any is `news`."""
+    found = np.uint64(0)
+    for c in range(mine.shape[0]):
+        news[c] = sent[c] & ~mine[c]
+        mine[c] |= news[c]
+        found |= news[c]
+    for c in range(s, mine.shape[0], num_slots):
+        mine[c] ^= news[c]  # as it was before, also in `tried` if that is the same row
+        news[c] = tried[c] & ~mine[c]
+        mine[c] |= news[c]
+        found |= news[c]
+    return bool(found != 0)
 
 
 @compiled()
-def _weigh(known: Known, weights: Int[np.ndarray, "W F"], weight: Int32[np.ndarray, "F"]) -> None:
-    """Fill in the weight of all robots known; a single row of weights is that of each."""
-    num_weights = weights.shape[0]
-    for t in range(weight.shape[0]):
-        weight[t] = weights[0, t] * _count(known[t]) if num_weights == 1 else 0
-    for k in range(num_weights if num_weights > 1 else 0):
-        for t in range(weight.shape[0]):
-            weight[t] += weights[k, t] * np.int64(known[t] >> np.uint64(k) & np.uint64(1))
+def _weigh(known: Known, value: Words, times: int, gained: Int[np.ndarray, "C"]) -> None:
+    """Add the value of all robots known, of which row p has the bits of 2 ** p, times a number."""
+    for p in range(value.shape[0]):
+        for c in range(known.shape[0]):
+            gained[c] += (times << p) * _count(known[c] & value[p, c])
 
 
 @compiled()
-def _spread(
-    frame: Frame,
-    tried: Int[np.ndarray, "F N"],
-    known: UInt64[np.ndarray, "N F"],
-    younger: Int[np.ndarray, "W F"],
-    total: Int32[np.ndarray, "F N F"],
-) -> None:
-    """Add to T in the last frame what robots learn of a word of others, in all trials.
+def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.ndarray, "C"]:
+    """Return the rise of T, summed over the last frame, by all that robots learn in all trials.
 
     Frames repeat, so the news of the first spreads as that of any other: a robot that knows it in a
     slot knows a later frame's in the same slot of the last one. So what it knows in a slot makes T
     a frame younger in the last frame, and in that frame itself younger than the start.
     """
-    num_slots, num_robots = tried.shape
-    last = (frame.rule.simulated_frames - 1) * num_slots
-    weight = np.empty(known.shape, dtype=np.int32)
-    weights = np.full((1, num_slots), num_slots)
+    (num_slots, num_robots), num_columns = tried.shape, known.shape[1]
+    last, news = (frame.rule.simulated_frames - 1) * num_slots, np.empty(num_columns, np.uint64)
+    each, gained = ~np.zeros((1, num_columns), np.uint64), np.zeros(num_columns, np.int64)
     for n in range(last + num_slots):
-        s, weights = n % num_slots, younger if n >= last else weights
+        s = n % num_slots
+        value, times = (each, num_slots * (last - n)) if n < last else (younger, last - n)
         for i in range(num_robots):
             # In place: a robot that transmits decodes nothing, so its row is as it was sent.
             j, k = frame.heard[s, i], tried[s, i]
-            is_news = (j != i or k != i) and _learn(known[i], known[j], known[k], s)
-            if is_news or n in (0, last):
-                _weigh(known[i], weights, weight[i])
-            for t in range(num_slots):
-                total[s, i, t] += weight[i, t]
+            if (j != i or k != i) and _learn(known[i], known[j], known[k], s, num_slots, news):
+                _weigh(news, value, times, gained)
+    for i in range(num_robots):
+        _weigh(known[i], younger, num_slots, gained)
+    return gained
 
 
 @compiled()
-def mean_ages(
-    frame: Frame, tried: Int[np.ndarray, "F N"], slots: Int[np.ndarray, "N F"]
-) -> Float[np.ndarray, "F"]:
-    """Return the mean age in the last of the frames simulated, in the trial of each slot [slots].
-
-    Robots transmit in these `slots` of all trials, and decode whom they do in `tried` in its slot.
-    """
-    (num_slots, num_robots), rule = tried.shape, frame.rule
-    last, start = (rule.simulated_frames - 1) * num_slots, int(rule.start_frames * num_slots)
-    total = np.zeros((num_slots, num_robots, num_slots), dtype=np.int32)
-    for first in range(0, num_robots, WORD):
-        known = np.zeros(slots.shape, dtype=np.uint64)
-        for i in range(first, min(first + WORD, num_robots)):
-            for t in range(num_slots):
-                known[i, t] = np.uint64(slots[i, t] != NOWHERE) << np.uint64(i - first)
-        _spread(frame, tried, known, slots[first : first + WORD] + (1 + start), total)
-    # A robot observes itself all the time, and all others at the start.
-    rest = (slots == NOWHERE) * (last + start) - slots - num_robots * start
-    ages = np.zeros(num_slots)
-    for s in range(num_slots):
-        for i in range(num_robots):
-            for t in range(num_slots):
-                ages[t] += last + s + 1 - (total[s, i, t] + rest[i, t] + s) / num_robots
-    return ages / (num_slots * num_robots)
+def mean_ages(frame: Frame, tried: Heard, own: int) -> Float[np.ndarray, "F"]:
+    """Return the mean age in the last frame if `own` is heard as `tried` in each slot [slots]."""
+    (num_slots, num_robots), start = tried.shape, int(frame.rule.start_frames * tried.shape[0])
+    num_columns = -(-num_robots // WORD) * num_slots
+    known, rest = np.zeros((num_robots, num_columns), np.uint64), np.zeros(num_slots)
+    younger = np.zeros((int(math.log2(start + num_slots)) + 1, num_columns), np.uint64)
+    for i in range(num_robots):
+        for t in range(num_slots if i == own or frame.slot[i] != NOWHERE else 0):
+            c, bit = i // WORD * num_slots + t, np.uint64(i % WORD)
+            by = (t if i == own else frame.slot[i]) + 1 + start
+            known[i, c] = np.uint64(1) << bit
+            rest[t] += num_slots * by  # of oneself, who is of now anyway
+            for p in range(younger.shape[0]):
+                younger[p, c] |= np.uint64(by >> p & 1) << bit
+    gained = _spread(frame, tried, known, younger).reshape(-1, num_slots).sum(axis=0) - rest
+    # Where nobody hears of others, these remain as old as they are at the start.
+    alone = start + num_slots * (frame.rule.simulated_frames - 0.5) + 0.5
+    return alone * (num_robots - 1) / num_robots - gained / (num_slots * num_robots**2)
 
 
 @compiled()
-def best_slot(
-    frame: Frame, k: int, own: int, min_gain: float, is_marked: Bool[np.ndarray, "F N"]
-) -> int:
+def _rounded_age(frame: Frame, tried: Heard, trial: int) -> float:
+    """Return the mean age of a trial as `mean_ages` does, but summed up robot by robot."""
+    (num_slots, num_robots), total = tried.shape, 0.0
+    last = (frame.rule.simulated_frames - 1) * num_slots
+    timestamp = np.full((num_robots, num_robots), -float(int(frame.rule.start_frames * num_slots)))
+    for n in range(last + num_slots):
+        s = n % num_slots
+        observe_own(timestamp, n + 1.0)
+        merge_timestamps(timestamp, tried[s] if s == trial else frame.heard[s], timestamp)
+        for i in range(num_robots if n >= last else 0):
+            total += n + 1 - np.sum(timestamp[i]) / num_robots
+    return total / (num_slots * num_robots)
+
+
+@compiled()
+def best_slot(frame: Frame, k: int, own: int, min_gain: float, is_marked: Marks) -> int:
     """Return the slot in which k's packets keep the team's information youngest.
 
     The frame is that of all others, and remains so. The robot keeps its own slot unless another is
     better by the least gain [slots]. A marked robot does not decode k in that slot.
     """
-    tried, slots = np.empty_like(frame.heard), np.empty(frame.heard.shape[::-1], dtype=np.int64)
+    trials = Frame(frame.rule, frame.power, frame.slot.copy(), frame.heard.copy())
+    tried = trials.heard
     for s in range(tried.shape[0]):
-        switch(frame, s, k)
-        slots[:, s] = frame.slot
+        switch(trials, s, k)
         for j in range(tried.shape[1]):
-            is_deaf = frame.heard[s, j] == k and is_marked[s, j]
-            tried[s, j] = j if is_deaf else frame.heard[s, j]
-        switch(frame, s, k)
-    ages = mean_ages(frame, tried, slots)
+            is_deaf = tried[s, j] == k and is_marked[s, j]
+            tried[s, j] = j if is_deaf else tried[s, j]
+    ages = mean_ages(frame, tried, k)
     # A move makes teammates' beliefs wrong until they hear of it, so small gains do not count.
     ages[own] -= min_gain
+    is_best = ages <= np.min(ages) + TIE
+    # Between equals, rounding decides: that of the sum over all robots, one after the other.
+    for s in range(ages.shape[0] if np.sum(is_best) > 1 else 0):
+        if is_best[s]:
+            ages[s] = _rounded_age(frame, tried, s) - (min_gain if s == own else 0.0)
     return int(np.argmin(ages))
 
 
@@ -230,7 +241,7 @@ def chosen(
     slots: Int[np.ndarray, "N"],
     announced: Int[np.ndarray, "N"],
     is_known: Bool[np.ndarray, "N"],
-    is_marked: Bool[np.ndarray, "F N"],
+    is_marked: Marks,
     order: Int[np.ndarray, "N"],
     slot: int,
     power: Float[np.ndarray, "N N"],

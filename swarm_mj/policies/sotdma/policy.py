@@ -156,8 +156,7 @@ def _is_in_range(
     position_m: Float[np.ndarray, "N N 2"], law: PowerLaw, threshold: float
 ) -> Bool[np.ndarray, "N N"]:
     """Return who decodes each robot's lone packets, as it believes; powers are over the noise."""
-    num_robots = position_m.shape[0]
-    power = np.empty((num_robots, num_robots))
-    for i in range(num_robots):
+    power = np.empty((position_m.shape[0], position_m.shape[0]))
+    for i in range(power.shape[0]):
         write_powers(i, position_m[i], law, power[i])
     return power >= threshold

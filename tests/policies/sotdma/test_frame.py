@@ -85,8 +85,6 @@ def test_eq10_the_mean_ages_are_those_of_robots_told_one_by_one(seed, num_robots
     rng, everyone = np.random.default_rng(seed), np.arange(num_robots)
     own = rng.integers(NOWHERE, NUM_SLOTS, num_robots)
     own[0] = NOWHERE
-    slots = np.tile(own[:, None], NUM_SLOTS)
-    slots[0] = np.arange(NUM_SLOTS)
     heard = np.tile(everyone, (NUM_SLOTS, 1))
     for s in range(NUM_SLOTS):
         senders, hears = np.flatnonzero(own == s), (rng.random(num_robots) < 0.5) & (own != s)
@@ -94,8 +92,8 @@ def test_eq10_the_mean_ages_are_those_of_robots_told_one_by_one(seed, num_robots
             heard[s, hears] = rng.choice(senders, np.sum(hears))
     hears_it = (rng.random(heard.shape) < 0.3) & (own != np.arange(NUM_SLOTS)[:, None])
     tried = np.where(hears_it | (everyone == 0), 0, heard)
-    frame = empty_frame(np.zeros((num_robots, num_robots)), RULE)._replace(heard=heard)
-    ages = mean_ages(frame, tried, slots)
+    frame = empty_frame(np.zeros((num_robots, num_robots)), RULE)
+    ages = mean_ages(frame._replace(heard=heard, slot=own), tried, 0)
     for s in range(NUM_SLOTS):
         trial = heard.copy()
         trial[s] = tried[s]
