@@ -135,7 +135,7 @@ class GnnActorCritic(ActorCriticPolicy):
         if not self._training.shares_trunk:
             self.value_network = FastAggregationGnn(replace(self._shape, num_outputs=1))
         self.optimizer = torch.optim.Adam(
-            self.parameters(), lr=lr_schedule(1.0), **self.optimizer_kwargs
+            self.parameters(), lr=lr_schedule(1.0), foreach=True, **self.optimizer_kwargs
         )
 
     def acting_network(self) -> AggregationGnn:
