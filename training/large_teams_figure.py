@@ -1,9 +1,10 @@
 """A chart of the age of walking teams by their size, from 10 to 1000 robots.
 
-    swarm-mj evaluate --task random-walk --robots 10 20 40 80 --seed 2000 --episodes 8 \
-      --policy planner sotdma gnn spatial-tdma gossip csma tdma random-flooding --csv small.csv
-    swarm-mj evaluate --task random-walk --robots 200 400 1000 --seed 2000 --episodes 8 \
-      --policy spatial-tdma gossip csma tdma random-flooding --csv large.csv
+    swarm-mj evaluate --task random-walk --robots 10 20 40 80 --seed 3000 --episodes 8 \
+      --policy planner age-gain-csma sotdma gnn spatial-tdma gossip csma tdma random-flooding \
+      --csv small.csv
+    swarm-mj evaluate --task random-walk --robots 200 400 1000 --seed 3000 --episodes 8 \
+      --policy age-gain-csma spatial-tdma gossip csma tdma random-flooding --csv large.csv
     python training/large_teams_figure.py
 
 training/results/large-random-walk.csv holds the rows of both. Writes assets/figures/large-teams.svg

@@ -5,20 +5,29 @@ Communications 23(12), 1975. Every robot always has a packet to send, and the ti
 takes is neglected.
 """
 
+from abc import abstractmethod
+from collections.abc import Sequence
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.buffers import BROADCAST
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import TrueLinks
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
 
 SENSED_BELOW_DB = 8.0  # what just decodes: two and a half times the range, in free space
+# What robots that contend by age gain sense beside that in turn: from 2 to 4 times the range.
+SHIFTS_DB = (2.0, 0.0, -2.0, -4.0)
+MINISLOTS = 50.0  # by which twice the gain is earlier
+DRAWN_MINISLOTS = 10.0  # against ties
 
 
 def sensed_dbm(mission: Mission) -> float:
@@ -28,41 +37,116 @@ def sensed_dbm(mission: Mission) -> float:
     return mission.noise_dbm + mission.sinr_threshold_db - SENSED_BELOW_DB
 
 
-class CarrierSense(RandomTransmission, CentralisedPolicy):
-    """Robots broadcast unless they sense another's packet.
+class SensingPolicy(CentralisedPolicy):
+    """The common base of policies whose robots broadcast unless they sense another's packet.
 
-    Nobody answers. p-persistent CSMA, with which IEEE 802.11 agrees on average (Cali, Conti and
-    Gregori 2000): a slot begins with minislots, and in each of them a robot whose channel is idle
-    begins with probability p. So a robot senses those in earlier minislots, but collides with those
-    in its own, and with those too far away to be sensed (hidden terminals).
+    Nobody answers. A slot begins with minislots. A robot begins in the one that it has chosen if
+    its channel is idle. So it senses those in earlier minislots, but collides with those in its
+    own, and with those too far away to be sensed (hidden terminals).
     """
 
     is_centralised = False
-    uses = "the power that it senses in the channel before it transmits"
     window = BroadcastPolicy.window
 
-    def __init__(self, probability: float, sensing_dbm: float) -> None:
-        """Take the probability in each minislot, and the power from which a channel is busy."""
-        super().__init__(probability)
-        self._sensed_mw = from_db(sensing_dbm)
+    def __init__(self, *sensed_dbm: float) -> None:
+        """Take the powers from which a channel is busy, of the slots in turn."""
+        self._sensed_mw = [from_db(each) for each in sensed_dbm]
 
     def inform(self, truth: TrueLinks) -> None:
         """Take the true channel, whose mean powers robots sense."""
         self._truth = truth
 
+    @abstractmethod
+    def minislots(self, views: LocalViews) -> Float[np.ndarray, "B N"]:
+        """Return each robot's minislot; it is infinite if the robot does not want to transmit."""
+
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return `BROADCAST` for each robot that finds its channel idle."""
-        # A geometric number; p = 0 waits forever, and p = 1 not at all.
-        with np.errstate(divide="ignore"):
-            minislot = np.floor(np.log1p(-self._stream.next()) / np.log1p(-self._probability))
+        minislot, slot = self.minislots(views), round(float(views.now[0]) / SLOT_WINDOWS)
+        sensed_mw = self._sensed_mw[slot % len(self._sensed_mw)]
         everyone = np.ones(minislot.shape, dtype=np.bool_)
         is_active = everyone if states.is_active is None else states.is_active
         recipient = views.silence.copy()
         for b, position_m in enumerate(states.position_m):
             power_mw = self._truth.links(position_m, b).interference_mw
-            begins = beginners(minislot[b], is_active[b], power_mw, self._sensed_mw)
+            begins = beginners(minislot[b], is_active[b], power_mw, sensed_mw)
             recipient[b, begins] = BROADCAST
         return recipient
+
+
+class CarrierSense(RandomTransmission, SensingPolicy):
+    """Robots broadcast unless they sense another's packet.
+
+    p-persistent CSMA, with which IEEE 802.11 agrees on average (Cali, Conti and Gregori 2000): in
+    each minislot a robot whose channel is idle begins with probability p.
+    """
+
+    uses = "the power that it senses in the channel before it transmits"
+
+    def __init__(self, probability: float, sensing_dbm: float) -> None:
+        """Take the probability in each minislot, and the power from which a channel is busy."""
+        RandomTransmission.__init__(self, probability)
+        SensingPolicy.__init__(self, sensing_dbm)
+
+    def minislots(self, views: LocalViews) -> Float[np.ndarray, "B N"]:  # noqa: ARG002
+        """Draw a geometric number for each robot; p = 0 waits forever, and p = 1 not at all."""
+        with np.errstate(divide="ignore"):
+            return np.floor(np.log1p(-self._stream.next()) / np.log1p(-self._probability))
+
+
+class AgeGainCsma(SensingPolicy):
+    """CSMA in which robots with more news transmit first.
+
+    News is the age gain (Chen, Gatsis, Hassani and Shirani Bidokhti, Age of information in random
+    access channels, 2022): by how much a packet lowers the ages at those who decode it. A robot
+    takes the rise of its mean T since its last packet for that, less what its neighbours learned
+    with it: of each packet that it decodes, the share of its range that the sender's covers. The
+    power that counts as busy changes from slot to slot: where it is low, fewer robots transmit, so
+    that packets get through weaker links.
+    """
+
+    uses = "the power that it senses before it transmits, T, and where those are that it hears"
+
+    def __init__(self, mission: Mission) -> None:
+        """Prepare the policy for the mission's radio."""
+        super().__init__(*(sensed_dbm(mission) + shift_db for shift_db in SHIFTS_DB))
+        self._range_m = mission.range_m
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Give every robot its own numbers, and no news; arguments as in `Policy.start`."""
+        self._stream = Stream(rngs, uniform, (num_robots,))
+        self._news = np.zeros((len(rngs), num_robots))  # [windows]
+        self._known = np.zeros_like(self._news)  # mean T when it was last asked [windows]
+
+    def minislots(self, views: LocalViews) -> Float[np.ndarray, "B N"]:
+        """Return an earlier minislot the more news a robot has; without any it waits forever."""
+        known = np.mean(views.buffers.timestamp, axis=2)
+        self._news += (known - self._known) * (1.0 - covered_share(views, self._range_m))
+        self._known = known
+        with np.errstate(divide="ignore"):
+            octaves = np.log2((views.now[:, np.newaxis] + 1.0) / self._news)
+        return np.floor(MINISLOTS * octaves + DRAWN_MINISLOTS * self._stream.next())
+
+    def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
+        """Return `BROADCAST` for robots that find their channel idle; they have no more news."""
+        recipient = super().recipients(views, states)
+        self._news[recipient == BROADCAST] = 0.0
+        return recipient
+
+
+def covered_share(views: LocalViews, range_m: float) -> Float[np.ndarray, "B N"]:
+    """Return how much of each robot's range is also that of the sender decoded last, from 0 to 1.
+
+    0 where it decoded nobody. Ranges are discs, and places what the robot believes.
+    """
+    if not views.phases:
+        return np.zeros(views.silence.shape)
+    heard, position_m = views.phases[-1].heard, views.buffers.position_m
+    mission, robot = np.ogrid[: heard.shape[0], : heard.shape[1]]
+    apart_m = position_m[mission, robot, heard] - position_m[mission, robot, robot]
+    half = np.minimum(np.linalg.norm(apart_m, axis=-1) / (2.0 * range_m), 1.0)
+    share = (np.arccos(half) - half * np.sqrt(1.0 - half**2)) * 2.0 / np.pi
+    return np.where(heard == views.silence, 0.0, share)
 
 
 @compiled()

@@ -11,7 +11,7 @@ from typing import Any
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, make
-from swarm_mj.policies.carrier_sense import CarrierSense, sensed_dbm
+from swarm_mj.policies.carrier_sense import AgeGainCsma, CarrierSense, sensed_dbm
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.planner.link_tables import link_fields
@@ -53,6 +53,7 @@ RULES: dict[str, Callable[..., Policy]] = {
     ),
     "aloha": lambda mission, probability: Aloha(probability, range_m=mission.range_m),
     "csma": lambda mission, probability: CarrierSense(probability, sensed_dbm(mission)),
+    "age-gain-csma": AgeGainCsma,
     "gossip": lambda _, probability: InnovationGossip(probability),
     "tdma": lambda _: Tdma(),
     "spatial-tdma": SpatialTdma,
@@ -65,6 +66,7 @@ RULES: dict[str, Callable[..., Policy]] = {
 # windows from which they do, these bytes, and those for each robot and pair, where teams move.
 PAIR_BYTES = {
     "csma": (0.0, 25.0, 0.0),
+    "age-gain-csma": (0.0, 25.0, 0.0),
     "sotdma": (1.5, 230.0, 0.0),
     "planner": (1.0, 250.0, 4.0),  # a plan by each of the snapshots that are still flown by
     "greedy-oracle": (0.0, 60.0, 0.0),

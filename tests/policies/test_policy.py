@@ -16,7 +16,10 @@ from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
 CENTRALISED = ["round-robin", "mst", "greedy-oracle"]
-SENSED = ["csma"]  # by the truth, which stands in for what robots sense before they transmit
+SENSED = [
+    "csma",
+    "age-gain-csma",
+]  # by the truth, which stands in for what robots sense before they transmit
 DECENTRALISED = [name for name in POLICIES if name not in (*CENTRALISED, *SENSED)]
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.

@@ -4,7 +4,7 @@ import pytest
 from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.carrier_sense import CarrierSense
+from swarm_mj.policies.carrier_sense import AgeGainCsma, CarrierSense
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.learned import LearnedPolicy
@@ -104,6 +104,7 @@ KINDS = {
     "round-robin": RoundRobin,
     "aloha": Aloha,
     "csma": CarrierSense,
+    "age-gain-csma": AgeGainCsma,
     "gossip": InnovationGossip,
     "tdma": Tdma,
     "spatial-tdma": SpatialTdma,

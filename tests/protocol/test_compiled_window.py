@@ -20,7 +20,7 @@ MISSIONS = {
     "all known": paper("random-walk", prior_knowledge="start", **SIZE),
     "several decode": paper("random-walk", sinr_threshold_db=-6.0, **SIZE),
 }
-POLICIES = ("random-flooding", "round-robin", "mst", "tdma", "csma", "planner")
+POLICIES = ("random-flooding", "round-robin", "mst", "tdma", "csma", "age-gain-csma", "planner")
 
 
 class OtherRadio(FreeSpaceRadio):

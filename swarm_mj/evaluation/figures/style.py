@@ -52,6 +52,7 @@ LOOKS = {
     "mst": Look("MST", "#009e73", "^"),
     "aloha": Look("slotted ALOHA", "#999933", "v"),
     "csma": Look("CSMA", "#661100", ">"),
+    "age-gain-csma": Look("age-gain CSMA", "#2244ee", "8"),
     "gossip": Look("gossip", "#882255", "P", size=5.0),
     "tdma": Look("TDMA", "#0072b2", "D", size=4.0),
     "spatial-tdma": Look("spatial TDMA", "#332288", "h", size=5.5),
