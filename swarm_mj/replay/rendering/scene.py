@@ -3,7 +3,7 @@
 import atexit
 import threading
 import warnings
-from contextlib import AbstractContextManager
+from contextlib import ExitStack
 from weakref import ref
 
 import mujoco._functions as functions  # private: type checkers see it only there
@@ -33,8 +33,8 @@ NO_WINDOW = 'the window needs a display; without one, render_mode="rgb_array" dr
 CLOSING_S = 5.0  # what the window may take to close
 
 
-class SceneRenderer(AbstractContextManager["SceneRenderer"]):
-    """Draws pictures of one mission's scene, all of one size.
+class SceneRenderer(ExitStack):
+    """Draws pictures of one mission's scene, all of one size, until `close` frees OpenGL's memory.
 
     MuJoCo's own `Renderer` takes the back end that was chosen when MuJoCo was imported, and frees
     its memory in whichever context is current; with two renderers that is the wrong one.
@@ -47,6 +47,7 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
 
         Raise OSError if no OpenGL works here.
         """
+        super().__init__()
         self._size, self._mission = (width, height), mission
         self._model = pictured(mission, scene, width, height)
         self._data = MjData(self._model)
@@ -63,7 +64,9 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
             self._opengl.free()
             raise unusable(error) from error
         mjr_setBuffer(mjtFramebuffer.mjFB_OFFSCREEN.value, self._context)
-        self._is_open = True
+        # The last comes first: else the memory would be freed in the context of another renderer.
+        for step in (self._opengl.free, self._context.free, self._opengl.make_current):
+            self.callback(step)
         atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
 
     def camera(self, footage: Footage, row: int = 0) -> markers.Camera:
@@ -94,18 +97,6 @@ class SceneRenderer(AbstractContextManager["SceneRenderer"]):
         mjr_render(whole, self._scene, self._context)
         mjr_readPixels(picture, None, whole, self._context)
         return picture[::-1].copy()
-
-    def close(self) -> None:
-        """Give OpenGL's memory back; nothing can be drawn any more."""
-        if self._is_open:
-            self._is_open = False
-            # Otherwise it would be freed in the context of another renderer.
-            self._opengl.make_current()
-            self._context.free()
-            self._opengl.free()
-
-    def __exit__(self, *error: object) -> None:
-        self.close()
 
 
 def _close(renderer: "ref[SceneRenderer]") -> None:
