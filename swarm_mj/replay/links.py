@@ -97,8 +97,7 @@ def is_other(robot: Phases) -> Bool[np.ndarray, "T 2 N"]:
 
 def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:
     """Return points at a height above the ground [m]."""
-    width = [(0, 0)] * (at_m.ndim - 1) + [(0, 1)]
-    return np.pad(at_m, width, constant_values=height_m)
+    return np.insert(at_m, 2, height_m, axis=-1)
 
 
 def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.ndarray, "L P 3"]:
