@@ -35,8 +35,6 @@ LINE = 1.45  # of a line's height, by the size of its type
 CHARACTERS = 52  # of a line
 POINTS_PER_IN = 72.0
 
-Colour = tuple[float, float, float]
-
 
 def draw_picture(footage: Footage, window: int | None = None) -> Figure:
     """Return a map of one window, 16 by 9; the last unless given, 1 is a mission's first.
@@ -69,9 +67,8 @@ def _row(footage: Footage, window: int | None) -> int:
     return len(windows) - 1 if window is None else windows.index(window)
 
 
-def _rgb(colour: palette.Colour) -> Colour:
-    red, green, blue = colour
-    return red / 255.0, green / 255.0, blue / 255.0
+def _rgb(colour: palette.Colour) -> str:
+    return f"#{bytes(colour).hex()}"
 
 
 def _size_pt(footage: Footage) -> float:
