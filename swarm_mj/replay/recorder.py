@@ -57,10 +57,7 @@ ON_DISK = ReplaySize(base=0.5e6, window=800.0, robot=110.0, matrix=0.04)
 
 @dataclass(frozen=True, kw_only=True)
 class Log(Footage):
-    """Footage and all else that a replay shows of a flight, as it was recorded.
-
-    Ages are those of the whole team; positions believed, and parents, are the ego robot's.
-    """
+    """Footage and all else that a replay shows of a flight, as it was recorded."""
 
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
     heard: Int[np.ndarray, "T 2 N"]  # the sender that robot j decoded in both phases; itself: none
