@@ -1,7 +1,4 @@
-"""Robots and packets, drawn into a scene next to the geoms of MuJoCo's model; and the camera.
-
-The camera looks down on a square of ground from the south.
-"""
+"""Robots and packets, drawn into a scene next to the geoms of MuJoCo's model; and the camera."""
 
 import itertools
 from typing import NamedTuple, TypeAlias

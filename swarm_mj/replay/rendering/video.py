@@ -1,7 +1,4 @@
-"""Videos as bytes, MP4 that browsers play and GIF: a mission's scene above its mean age.
-
-Two missions stand side by side.
-"""
+"""Videos as bytes, MP4 that browsers play and GIF: a mission's scene above its mean age."""
 
 import io
 import itertools
