@@ -61,7 +61,14 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
         recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
         recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(log.facts))))
         out = RerunLog(recording, log, ground)
-        draw(out)
+        # First: rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
+        draw_stage(out)
+        draw_team(out)
+        draw_legend(out)
+        charts.draw_tree(out)
+        charts.draw_age_matrix(out)
+        charts.draw_states(out)
+        charts.draw_plots(out)
         about = "\n".join([f"# {name}", *_about(log, config)])
         out.fixed("about", rr.TextDocument(about, media_type="text/markdown"))
     return stream.read() or b""
@@ -85,18 +92,6 @@ def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:
         bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
         rate = bits / (len(log.window) * log.facts.mission.window_s)
         yield f"- **sent by the team**: {bits_per_second(rate)}"
-
-
-def draw(out: RerunLog) -> None:
-    """Draw every layer of a replay."""
-    # First, for rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
-    draw_stage(out)
-    draw_team(out)
-    draw_legend(out)
-    charts.draw_tree(out)
-    charts.draw_age_matrix(out)
-    charts.draw_states(out)
-    charts.draw_plots(out)
 
 
 def draw_team(out: RerunLog) -> None:

@@ -69,7 +69,7 @@ def test_a_replay_is_replaced_whole_or_stays(two_way, tmp_path, monkeypatch):
         raise OSError("no space left")
 
     with monkeypatch.context() as broken:
-        broken.setattr("swarm_mj.replay.write.draw", fail)
+        broken.setattr("swarm_mj.replay.write.draw_team", fail)
         with pytest.raises(OSError, match="no space left"):
             write_replay(two_way.log, {"seed": 1}, path)
     assert path.read_text() == "old"
