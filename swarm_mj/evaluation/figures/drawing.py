@@ -6,6 +6,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
+from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patheffects import withStroke
@@ -188,7 +189,7 @@ def _name(axes: Axes, curve: Curve, end: tuple[float, float], place: tuple[float
         xy=end,
         xytext=place,
         textcoords="axes fraction",
-        color=look.ink,
+        color=[0.7 * share for share in to_rgb(look.colour)],  # darker, for type is thin
         fontsize=8,
         fontstyle="italic" if curve.is_published else "normal",
         va="center",

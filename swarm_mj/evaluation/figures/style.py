@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import NamedTuple, cast
 
 import matplotlib.style
-from matplotlib.colors import to_rgb
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -39,11 +38,6 @@ class Look(NamedTuple):
     marker: str
     size: float = 4.5  # of the marker [pt]
     width: float = 1.4  # of the line [pt]
-
-    @property
-    def ink(self) -> tuple[float, ...]:
-        """The colour for type, which is thin: darker."""
-        return tuple(0.7 * share for share in to_rgb(self.colour))
 
 
 LOOKS = {
