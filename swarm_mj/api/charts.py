@@ -47,25 +47,22 @@ def draw_flight(
     `own_cost` is the name and the unit of the task's cost, if it has one.
     """
     colour = look_of(policy).colour
-    is_flock = own_cost is not None and own_cost[0] == Flocking.cost_name
     number = 2 if own_cost else 1
     with styled():
         figure, axes = _axes(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
         for each in axes:
             each.margins(x=0.01)
         _draw_age(axes[0], columns, colour)
-        if own_cost and not is_flock:
-            axes[1].plot(columns["window"], columns["task_cost"], color=colour)
+        if own_cost:
             name, unit = own_cost
+            cost, least = columns["task_cost"], 0.0
+            axes[1].plot(columns["window"], cost, color=colour)
             axes[1].set_ylabel(f"{name}\n[{unit}]")
-            axes[1].set_ylim(bottom=0.0)
-        elif is_flock:
-            variance = columns["velocity_variance"]
-            axes[1].semilogy(columns["window"], variance, color=colour)
-            axes[1].set_ylabel(LABELS["velocity_variance"])
-            # Far below its largest value the variance of a converged flock is rounding noise.
-            least = max(float(np.min(variance)), MIN_SHARE * float(np.max(variance)))
-            axes[1].set_ylim(bottom=least / 2.0)
+            if name == Flocking.cost_name:
+                axes[1].set_yscale("log")
+                # Far below its largest value the variance of a converged flock is rounding noise.
+                least = max(float(np.min(cost)), MIN_SHARE * float(np.max(cost))) / 2.0
+            axes[1].set_ylim(bottom=least)
         axes[-1].set_xlabel(f"window of {window_s:g} s")
     return kept(figure)
 
