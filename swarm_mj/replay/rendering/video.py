@@ -68,12 +68,9 @@ class Movie(ExitStack):
             ]
             self.push(opened.pop_all())
 
-    def __len__(self) -> int:
-        return self._num_frames
-
     def __iter__(self) -> Iterator[Picture]:
         lengths = [len(each.window) for each in self._footages]
-        rows = np.linspace(0, max(lengths) - 1, len(self)).round().astype(int).tolist()
+        rows = np.linspace(0, max(lengths) - 1, self._num_frames).round().astype(int).tolist()
         for row in rows:  # a mission that is over stands still
             yield self.picture([min(row, length - 1) for length in lengths])
 
