@@ -133,8 +133,8 @@ def _drawn(model: MjModel, data: MjData, g: int, fill_mode: str) -> rr.AsCompone
     }
     kind, size, place = model.geom_type[g], model.geom_size[g], data.geom_xpos[g]
     rotation = data.geom_xmat[g].reshape(3, 3)
+    middle, half = np.split(model.geom_aabb[g], 2)
     if kind in (SPHERE, ELLIPSOID):
-        half = size if np.all(size > 0.0) else np.full(3, size[0])  # a sphere's has one number
         return rr.Ellipsoids3D(half_sizes=[half], centers=[place], **style)
     if kind in (CYLINDER, CAPSULE):
         style |= {"radii": [size[0]], "lengths": [2.0 * size[1]]}
@@ -145,7 +145,6 @@ def _drawn(model: MjModel, data: MjData, g: int, fill_mode: str) -> rr.AsCompone
     if kind == PLANE:  # a plate whose upper face is the plane; sizes of 0 are without end
         half = [*np.where(size[:2] > 0.0, size[:2], FAR_M), FLOOR_M]
         return rr.Boxes3D(half_sizes=[half], centers=[place - FLOOR_M * rotation[:, 2]], **style)
-    middle, half = np.split(model.geom_aabb[g], 2)
     return rr.Boxes3D(half_sizes=[half], centers=[place + rotation @ middle], **style)
 
 
