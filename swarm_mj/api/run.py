@@ -47,7 +47,6 @@ PLACES = {  # of a window's numbers in its record, by their columns
     "is_complete": "costs.is_complete",
     **{f"packets_{name}": f"costs.packets.{name}" for name in PACKET_COUNTS},
 }
-ENDINGS = ".rrd|.mp4|.gif|.json|.csv"  # of files that hold a run
 
 
 class Metrics(dict[str, Any]):
@@ -218,7 +217,7 @@ class Run:
             OSError: The file cannot be written, or no OpenGL works here.
         """
         path = Path(path)
-        check_outputs(Output("the file", path, ENDINGS))
+        check_outputs(Output("the file", path, ".rrd|.mp4|.gif|.json|.csv"))
         match path.suffix.lower():
             case ".rrd":
                 log = self.footage()
