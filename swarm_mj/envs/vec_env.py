@@ -24,6 +24,8 @@ class SwarmVecEnv(VecEnv):
     Environments run batch by batch, mission by mission and, if a robot is one, robot by robot.
     """
 
+    reward_unit = 1.0  # what agents are paid is divided by it
+
     def __init__(
         self,
         batches: Sequence[MissionBatch],
@@ -65,7 +67,7 @@ class SwarmVecEnv(VecEnv):
             # Teams smaller than the largest one are padded with columns of silence.
             recipient = self._actions[envs].reshape(batch.num_missions, -1)
             paid = batch.step(recipient[:, : batch.mission.num_robots])
-            reward[envs] = self._scaled(paid, batch)[:, : self._per_mission(batch)].ravel()
+            reward[envs] = paid[:, : self._per_mission(batch)].ravel() / self.reward_unit
             done[envs] = batch.is_over
         # Of this window: a restart, below, forgets them.
         self.costs = [batch.costs for batch in self.batches if batch.costs is not None]
@@ -121,11 +123,6 @@ class SwarmVecEnv(VecEnv):
     def _is_truncated(self) -> Bool[np.ndarray, "E"]:
         """Return where a mission's end is a cut in time; as Gymnasium has it, everywhere."""
         return np.ones(self.num_envs, dtype=np.bool_)
-
-    def _scaled(self, reward: np.ndarray, batch: MissionBatch) -> np.ndarray:
-        """Return rewards [B, N] in the unit that agents are paid in."""
-        del batch
-        return reward
 
     def _infos(self) -> list[dict[str, Any]]:
         infos: list[dict[str, Any]] = []

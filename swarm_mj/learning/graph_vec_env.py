@@ -38,9 +38,11 @@ class GraphVecEnv(SwarmVecEnv):
 
         Raises ValueError if they cannot be shared out evenly, or a size would have no batch.
         """
-        self.rng, self._team_reward = rng, training.reward
+        self.rng = rng
         self.agent, self.batches = training.credit_assignment, _make_batches(training)
         self.num_nodes = max(training.robots)  # of every graph
+        if self.agent == "team" and training.reward == "aoi":
+            self.reward_unit = float(training.mission.num_windows)
         for n, batch in enumerate(self.batches):
             last_window = training.mission.num_windows * (n + 1) // len(self.batches)
             batch.restart(self._draw_seeds(batch), max(1, last_window))
@@ -92,10 +94,6 @@ class GraphVecEnv(SwarmVecEnv):
         # The value of missions cut off early goes on, that of ended ones is 0.
         is_cut = [batch.last_window < batch.mission.num_windows for batch in self.batches]
         return np.repeat(is_cut, [envs.stop - envs.start for envs in self._envs])
-
-    def _scaled(self, reward: np.ndarray, batch: MissionBatch) -> np.ndarray:
-        is_age = self.agent == "team" and self._team_reward == "aoi"
-        return reward / batch.mission.num_windows if is_age else reward
 
     def _infos(self) -> list[dict[str, Any]]:
         return [{} for _ in range(self.num_envs)]  # nothing reads them, and each takes its time
