@@ -12,12 +12,7 @@ from gymnasium import spaces
 from jaxtyping import Bool
 from stable_baselines3 import PPO
 
-from swarm_mj.envs.mission_batch import (
-    FIRST_TRAINING_SEED,
-    LAST_TRAINING_SEED,
-    MissionBatch,
-    Observation,
-)
+from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.vec_env import SwarmVecEnv
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
@@ -87,8 +82,7 @@ class GraphVecEnv(SwarmVecEnv):
 
     def _draw_seeds(self, batch: MissionBatch) -> list[int]:
         # One generator for all batches: a checkpoint keeps its state alone.
-        size = batch.num_missions
-        return self.rng.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, size=size).tolist()
+        return [seed_or_next(None, self.rng) for _ in range(batch.num_missions)]
 
     def _is_truncated(self) -> Bool[np.ndarray, "E"]:
         # The value of missions cut off early goes on, that of ended ones is 0.
