@@ -160,10 +160,8 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     size, rollout = max(training.robots), rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS
     num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
-    held_out, under_way = (
-        needs.missions_memory(size, number, is_learned=True)
-        for number in (num_flown, training.missions)
-    )
+    held_out = needs.missions_memory(size, num_flown, is_learned=True)
+    under_way = needs.missions_memory(size, training.missions, is_learned=True)
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - needs.LIBRARIES - needs.TORCH) + passes

@@ -86,9 +86,8 @@ def compose(
 
 def _arena_with_robots(num_robots: int) -> MjSpec:
     """Read the arena and as many robots as one text: `attach` takes minutes for thousands."""
-    arena, robot = (
-        ElementTree.parse(asset(f"{name}.xml")).getroot() for name in ("arena", "robot")
-    )
+    arena = ElementTree.parse(asset("arena.xml")).getroot()
+    robot = ElementTree.parse(asset("robot.xml")).getroot()
     ElementTree.SubElement(arena, "actuator")
     for part in ("worldbody", "actuator"):
         (whole,) = arena.iter(part)
