@@ -90,10 +90,8 @@ PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 def radio_in_words(mission: Mission) -> str:
     """Return what differs from the paper's radio, in words; empty if nothing does."""
     numbers = ("sinr_threshold_db", "noise_dbm", "sensing_dbm")
-    other = {
-        n: getattr(mission, n) for n in numbers if getattr(mission, n) != getattr(Mission(), n)
-    }
-    words = [f"{name} {as_typed(value)}" for name, value in other.items()]
+    other = [name for name in numbers if getattr(mission, name) != getattr(Mission(), name)]
+    words = [f"{name} {as_typed(getattr(mission, name))}" for name in other]
     return ", ".join(filter(None, (mission.beyond_free_space, *words)))
 
 
