@@ -86,7 +86,8 @@ def evaluate(
 def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWindow) -> Row:
     """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
     if curve:
-        return {name: x for name, x in curve[0].items() if name in selection.REFERENCE_COLUMNS}
+        names = [selection.column(cost, n) for cost in JUDGED for n in selection.REFERENCES]
+        return {name: x for name, x in curve[0].items() if name in names}
     columns, flown_by = {}, selection.reference_missions(training)
     flights = Flights(training=training, on_window=on_window, total=len(flown_by))
     for name, num_missions in flown_by.items():

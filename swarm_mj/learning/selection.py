@@ -150,9 +150,6 @@ def column(cost: str, name: str) -> str:
     return f"{cost}_{name}".replace("-", "_")
 
 
-REFERENCE_COLUMNS = [column(cost, name) for cost in JUDGED for name in REFERENCES]
-
-
 def reference_missions(training: Training) -> dict[str, int]:
     """Return how many held-out missions of each team size each of `REFERENCES` flies, if any."""
     flown = dict.fromkeys(REFERENCES, training.held_out)
