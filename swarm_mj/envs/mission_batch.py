@@ -115,12 +115,11 @@ class MissionBatch:
 
     def _see(self) -> None:
         """Keep the robots' present graphs; a robot that has failed may only be silent."""
-        graphs: Graphs = self._extractor.graphs(self.flown.views)
+        self.graphs: Graphs = self._extractor.graphs(self.flown.views)
         if self.flown.states.is_active is not None:
             own = np.tile(np.eye(self.mission.num_robots, dtype=np.bool_), (self.num_missions, 1))
-            may_address = graphs.may_address & (self.is_active.reshape(-1, 1) | own)
-            graphs = replace(graphs, may_address=may_address)
-        self.graphs = graphs
+            may_address = self.graphs.may_address & (self.is_active.reshape(-1, 1) | own)
+            self.graphs = replace(self.graphs, may_address=may_address)
 
     @property
     def flown(self) -> Swarm:
@@ -172,8 +171,7 @@ class MissionBatch:
         else:
             for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
                 infos[name] = getattr(costs, name)
-            packets = costs.packets
-            infos |= {f"packets_{name}": getattr(packets, name) for name in PACKETS}
+            infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
             task_cost = costs.task_cost
         return infos if task_cost is None else infos | {"task_cost": task_cost.value}
 
