@@ -8,7 +8,6 @@ from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.options import largest_feature
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.packet_memory import LONG_WINDOWS
-from swarm_mj.protocol.buffers import Buffers
 
 NUM_OWN = 5  # numbers of a robot itself: x, y, their velocities, whether it is active
 
@@ -28,20 +27,16 @@ def truth(batch: MissionBatch) -> Float32[np.ndarray, "B S"]:
     robot, on the scale of the extended features.
     """
     mission, swarm = batch.mission, batch.flown
+    age = np.minimum(swarm.now[:, np.newaxis, np.newaxis] - swarm.buffers.timestamp, LONG_WINDOWS)
+    log_age = np.log1p(age) / np.log1p(LONG_WINDOWS)  # 0 is now, 1 is `LONG_WINDOWS` ago
     robots = np.concatenate(
         [
             swarm.states.position_m / mission.half_side_m,
             swarm.states.velocity_mps / (mission.max_velocity_mps or 1.0),
             batch.is_active[..., np.newaxis],
-            _log_ages(swarm.buffers, swarm.now[:, np.newaxis, np.newaxis]),
+            np.where(swarm.buffers.is_known, log_age, 1.0),  # 1 is also what was never known
         ],
         axis=-1,
     )
     flown = swarm.now[:, np.newaxis] / mission.num_windows
     return np.hstack([flown, robots.reshape(len(flown), -1)]).astype(np.float32)
-
-
-def _log_ages(buffers: Buffers, now: np.ndarray) -> np.ndarray:
-    """Return the ages of T: 0 is now, 1 is `LONG_WINDOWS` ago or never; at once, in NumPy."""
-    age = np.log1p(np.minimum(now - buffers.timestamp, LONG_WINDOWS)) / np.log1p(LONG_WINDOWS)
-    return np.where(buffers.is_known, age, 1.0)
