@@ -15,13 +15,7 @@ from gymnasium.vector.utils import batch_space, create_empty_array
 from jaxtyping import Int, UInt8
 
 from swarm_mj.envs.gymnasium import Screen, rendering
-from swarm_mj.envs.mission_batch import (
-    Info,
-    MissionBatch,
-    Observation,
-    seed_or_next,
-    seeds_from,
-)
+from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next, seeds_from
 from swarm_mj.envs.options import make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set
