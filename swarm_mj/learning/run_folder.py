@@ -29,7 +29,6 @@ PATIENCE = {"robot": 8, "team": 40}  # evaluations
 KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
 WINDOW_BYTES = 2.0  # of the checkpoint, for each robot and window of a mission
 CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
-MAX_EVALUATIONS = 1_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +62,7 @@ class Limits:
         None,
         "stop after this many evaluations in a row without improvement; 0: never",
         low=0,
-        high=MAX_EVALUATIONS,
+        high=1_000_000,
         shown=f"{PATIENCE['robot']}, team: {PATIENCE['team']}",
     )
     checkpoint_every_s: float = setting(10.0, low=0.0, high=1e6)  # at least, between two
