@@ -1,7 +1,5 @@
 """The command line, one file per command.
 
-`swarm-mj fly | evaluate | train | curves | figures | replay | scene | policies | doctor | bench`.
-
 Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted by Ctrl-C, SIGTERM or a
 hang-up. A reader that closes the pipe, as `| head` does, and a terminal that is gone are no errors.
 """
