@@ -144,21 +144,14 @@ def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) 
     more = f" --budget {2 * progress.decisions}" if is_over else ""
     if has_stopped_early(asked, progress) and progress.has_chosen:
         more = " --patience 0"
-    commands = {
-        "Watch:": f"{this_command('tensorboard')} --logdir {shlex.quote(str(out))}",
-        "Go on:": _resume_command(out, training, more),
-    }
     if progress.best is not None:
         flown = f"--policy {shlex.quote(str(out / POLICY))}"
         flags = mission_flags(replace(training.mission, num_robots=training.robots[0]))
         flags += f" {training.own_options}" if training.own else ""
-        fly = {
-            "Fly:": f"{this_command()} fly {flown} {flags}",
-            "Evaluate:": f"{this_command()} evaluate {flown} tdma {flags}",
-        }
-        commands = fly | commands
-    for label, line in commands.items():
-        console.print(f"{label:10}{line}")
+        console.print(f"Fly:      {this_command()} fly {flown} {flags}")
+        console.print(f"Evaluate: {this_command()} evaluate {flown} tdma {flags}")
+    console.print(f"Watch:    {this_command('tensorboard')} --logdir {shlex.quote(str(out))}")
+    console.print(f"Go on:    {_resume_command(out, training, more)}")
 
 
 def _resume_command(out: Path, training: Training, more: str = "") -> str:
