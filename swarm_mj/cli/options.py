@@ -29,7 +29,6 @@ from swarm_mj.system.fields import (
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 output_option = partial(setting, group="output")  # under this heading of the help
-HELP_ALL = "help_all"
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
 
@@ -82,7 +81,7 @@ class _Formatter(argparse.HelpFormatter):
     def _format_action_invocation(self, action: argparse.Action) -> str:
         """Return a flag without those that it had in earlier releases."""
         shown = copy(action)
-        if shown.dest not in ("help", HELP_ALL):
+        if shown.dest not in ("help", "help_all"):
             shown.option_strings = action.option_strings[:1]
         return super()._format_action_invocation(shown)
 
@@ -168,7 +167,7 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
     )
     if rare := _rare(kind, options):
         about = "show all options and exit"
-        parser.add_argument("--help-all", dest=HELP_ALL, action=_HelpAll, nargs=0, help=about)
+        parser.add_argument("--help-all", action=_HelpAll, nargs=0, help=about)
     groups: dict[str, Any] = {"": parser}
     for spec in options:
         heading = spec.metadata.get("group", "")
