@@ -148,8 +148,7 @@ def _flying_s(
     """Return the wall time of an evaluation's missions [s]."""
     study = Study(policies=policies, regimes=(mission,), episodes=num_episodes)
     start_s = time.perf_counter()
-    for _ in run_jobs(fly_batch, study.batches, num_jobs):
-        pass
+    list(run_jobs(fly_batch, study.batches, num_jobs))
     return time.perf_counter() - start_s
 
 
