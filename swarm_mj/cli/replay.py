@@ -26,7 +26,6 @@ VIDEO, PICTURE = "video", "picture"  # headings of the help
 _video = partial(setting, group=VIDEO)
 OWN_TIME = f"the mission's own time, {view.LONGEST_S:g} at most"
 BARE = "the bare arena"
-PIXELS = (160, 3840)  # of a side
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -159,7 +158,7 @@ def _style(options: ReplayOptions, suffix: str) -> view.VideoStyle:
     if options.size:
         match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", options.size)
         width, height = (int(number) for number in match.groups()) if match else (0, 0)
-        low, high = PIXELS
+        low, high = 160, 3840  # of a side
         if not (low <= width <= high and low <= height <= high):
             allowed = f"WIDTHxHEIGHT from {low}x{low} to {high}x{high}"
             raise ValueError(f"size must be {allowed}, not {options.size}")
