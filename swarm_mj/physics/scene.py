@@ -144,13 +144,10 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 
 def _motion(spec: MjSpec) -> dict[str, str]:
     """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
-    parts = [
-        *((part.name, part) for part in (*spec.joints, *spec.actuators)),
-        ("option", spec.option),
-    ]
+    parts = [(part.name, part) for part in (*spec.joints, *spec.actuators)]
     return {
         f"{name} of {owner}": str(np.asarray(value).tolist())  # in which nan is nan
-        for owner, part in parts
+        for owner, part in [*parts, ("option", spec.option)]
         for name in MOVING
         if (value := getattr(part, name, None)) is not None
     }
