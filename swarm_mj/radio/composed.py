@@ -5,7 +5,6 @@ mission's key and of the slot, so a slot that is played again is the same slot.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
@@ -21,6 +20,7 @@ from swarm_mj.radio.fading import (
     link_key,
     mixed,
 )
+from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.power_law import MeanPowers, PowerLaw, compute_powers, no_powers, place_robots
 from swarm_mj.radio.reception import Air, add_to_air, decoded, incoming_at, silent_air
 from swarm_mj.system.compiled import compiled
@@ -68,9 +68,20 @@ class ComposedChannel:
             std_db, correlation_m = self._shadowing_db, self._shadowing_distance_m
             self._waves = draw_waves(std_db, correlation_m, num_robots, rngs)
 
-    def at(self, slot: Int[np.ndarray, "W"], mission: Int[np.ndarray, "W"]) -> "SlotChannel":
+    def at(self, slot: Int[np.ndarray, "W"], mission: Int[np.ndarray, "W"]) -> Channel:
         """Return the channel of W rows: of each its slot and its mission, counted from 0."""
-        return SlotChannel(self, slot, mission)
+        return lambda position_m, recipient: self._heard(position_m, recipient, slot, mission)
+
+    def _heard(
+        self,
+        position_m: Float[np.ndarray, "W N 2"],
+        recipient: Int[np.ndarray, "W N"],
+        slot: Int[np.ndarray, "W"],
+        mission: Int[np.ndarray, "W"],
+    ) -> Int[np.ndarray, "W N"]:
+        is_sender = recipient != np.arange(recipient.shape[1])
+        received_mw = self.received_mw(position_m, mission, is_sender)
+        return _decode(received_mw, recipient, slot, mission, self.key, self.reception)
 
     def received_mw(
         self,
@@ -104,24 +115,6 @@ class ComposedChannel:
         is_linked = self.mean_powers_mw(position_m, mission) >= rule.noise_mw * rule.threshold
         group = strong_groups(is_linked)
         return group == np.argmax(np.bincount(group))
-
-
-@dataclass(frozen=True)
-class SlotChannel:
-    """A `Channel` of one slot."""
-
-    channel: ComposedChannel
-    slot: Int[np.ndarray, "W"]
-    mission: Int[np.ndarray, "W"]
-
-    def __call__(
-        self, position_m: Float[np.ndarray, "W N 2"], recipient: Int[np.ndarray, "W N"]
-    ) -> Int[np.ndarray, "W N"]:
-        """Return whose packet each robot decodes; arguments as in `Channel`."""
-        channel, mission = self.channel, self.mission
-        is_sender = recipient != np.arange(recipient.shape[1])
-        received_mw = channel.received_mw(position_m, mission, is_sender)
-        return _decode(received_mw, recipient, self.slot, mission, channel.key, channel.reception)
 
 
 def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
