@@ -152,25 +152,18 @@ def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) ->
 
     Cosines and sines cost more than all else here, so they are computed once for each place.
     """
+    first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
     for i in range(position_m.shape[0]):
         x = np.floor(position_m[i, 0] / waves.step_m + 0.5)
         y = np.floor(position_m[i, 1] / waves.step_m + 0.5)
         if x != waves.place[b, i, 0] or y != waves.place[b, i, 1]:
             waves.place[b, i, 0], waves.place[b, i, 1] = x, y
-            _set_ends(x * waves.step_m, y * waves.step_m, waves, b, waves.ends[b, i])
-
-
-@compiled()
-def _set_ends(
-    x_m: float, y_m: float, waves: Waves, b: int, ends: Float32[np.ndarray, "E W"]
-) -> None:
-    """Fill `ends` with the cosines and sines of mission b's waves in this place."""
-    first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
-    for w in range(phase.shape[0]):
-        first = first_end[w, 0] * x_m + first_end[w, 1] * y_m
-        other = other_end[w, 0] * x_m + other_end[w, 1] * y_m + phase[w]
-        ends[FIRST_COS, w], ends[FIRST_SIN, w] = math.cos(first), math.sin(first)
-        ends[OTHER_COS, w], ends[OTHER_SIN, w] = math.cos(other), math.sin(other)
+            x_m, y_m, ends = x * waves.step_m, y * waves.step_m, waves.ends[b, i]
+            for w in range(phase.shape[0]):
+                first = first_end[w, 0] * x_m + first_end[w, 1] * y_m
+                other = other_end[w, 0] * x_m + other_end[w, 1] * y_m + phase[w]
+                ends[FIRST_COS, w], ends[FIRST_SIN, w] = math.cos(first), math.sin(first)
+                ends[OTHER_COS, w], ends[OTHER_SIN, w] = math.cos(other), math.sin(other)
 
 
 @compiled()
