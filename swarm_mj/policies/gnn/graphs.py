@@ -12,7 +12,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
-from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
@@ -80,8 +79,7 @@ class PaperFeatures(FeatureExtractor):
             per_m=1.0 / mission.side_m,
             per_mps=mission.num_windows * mission.window_s / mission.side_m,
         )
-        since = np.zeros_like(views.now)
-        return _with_state(node, buffers, since=since, is_relative=False, scale=scale)
+        return _with_state(node, views, is_relative=False, scale=scale)
 
 
 class ReferenceFeatures(FeatureExtractor):
@@ -101,7 +99,7 @@ class ReferenceFeatures(FeatureExtractor):
         node["zero"] = 0.0
         per_m = 1.0 / MISSION_DISTANCE_M  # they divide velocities by a distance, too
         scale = Scale(per_window=1.0 / REFERENCE_WINDOWS, per_m=per_m, per_mps=per_m)
-        return _with_state(node, views.buffers, since=views.now, is_relative=True, scale=scale)
+        return _with_state(node, views, is_relative=True, scale=scale)
 
 
 class Scale(NamedTuple):
@@ -113,20 +111,16 @@ class Scale(NamedTuple):
 
 
 def _with_state(
-    node: Shaped[np.ndarray, "B N N"],
-    buffers: Buffers,
-    *,
-    since: Float[np.ndarray, "B"],
-    is_relative: bool,
-    scale: Scale,
+    node: Shaped[np.ndarray, "B N N"], views: LocalViews, *, is_relative: bool, scale: Scale
 ) -> Graphs:
     """Write what the buffers hold into nodes; in their graphs everyone may be addressed."""
+    buffers = views.buffers
     _write_state(
         timestamp=buffers.timestamp,
         last_attempt=buffers.last_attempt,
         position_m=buffers.position_m,
         velocity_mps=buffers.velocity_mps,
-        since=since,
+        now=views.now,
         is_relative=is_relative,
         scale=scale,
         node=node,
@@ -147,25 +141,26 @@ def _write_state(
     last_attempt: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N N 2"],
     velocity_mps: Float[np.ndarray, "B N N 2"],
-    since: Float[np.ndarray, "B"],
+    now: Float[np.ndarray, "B"],
     is_relative: bool,
     scale: Scale,
     node: Shaped[np.ndarray, "B N N"],
 ) -> None:
-    """Write times since a moment, and states, relative to the robot's own or not, to scale."""
+    """Write times and states to scale, relative to now and to the robot's own states or not."""
     # One compiled pass: whole arrays, one operation after the other, took up to six times as long.
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
-            x_m = y_m = x_mps = y_mps = 0.0
+            t = x_m = y_m = x_mps = y_mps = 0.0
             if is_relative:
+                t = now[b]
                 x_m, y_m = position_m[b, i, i]
                 x_mps, y_mps = velocity_mps[b, i, i]
             for k in range(num_robots):
                 of_k = node[b, i, k]
-                of_k.timestamp = (timestamp[b, i, k] - since[b]) * scale.per_window
+                of_k.timestamp = (timestamp[b, i, k] - t) * scale.per_window
                 of_k.x = (position_m[b, i, k, 0] - x_m) * scale.per_m
                 of_k.y = (position_m[b, i, k, 1] - y_m) * scale.per_m
                 of_k.velocity_x = (velocity_mps[b, i, k, 0] - x_mps) * scale.per_mps
                 of_k.velocity_y = (velocity_mps[b, i, k, 1] - y_mps) * scale.per_mps
-                of_k.last_attempt = (last_attempt[b, i, k] - since[b]) * scale.per_window
+                of_k.last_attempt = (last_attempt[b, i, k] - t) * scale.per_window
