@@ -146,7 +146,9 @@ class _Team:
         self._epoch += 1
         self._before = [self._plans.get(owner) for owner in self._planned_by.tolist()]
         self._plans = {}
-        is_common = self._epoch == 0 and _is_common(view)
+        # Whether all robots begin with the same complete picture of one moment.
+        is_same = np.all(view.is_known) and np.all(view.timestamp == view.timestamp[0, 0])
+        is_common = self._epoch == 0 and bool(is_same)
         self._num_skipped += is_common  # there is nothing to discover
         epoch, num_robots = self._epoch + self._num_skipped, len(self._everyone)
         length = epoch_windows(epoch, num_robots, self._settings)
@@ -188,11 +190,6 @@ class _Team:
                 is_free=np.array(purposes) == "plan",
             )
         return self._plans[owner]
-
-
-def _is_common(view: TeamView) -> bool:
-    """Return whether all robots have the same complete picture of one moment."""
-    return bool(np.all(view.is_known) and np.all(view.timestamp == view.timestamp[0, 0]))
 
 
 def epoch_windows(epoch: int, num_robots: int, settings: PlannerSettings) -> int:
