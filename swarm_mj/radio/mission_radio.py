@@ -16,12 +16,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
-from swarm_mj.radio.free_space import (
-    Channel,
-    FreeSpaceRadio,
-    VaryingChannel,
-    transmit_power_dbm,
-)
+from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
 from swarm_mj.radio.power_law import (
     FREE_SPACE_EXPONENT,
