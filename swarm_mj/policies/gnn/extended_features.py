@@ -47,7 +47,6 @@ FEATURES = {
 }
 NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
-Pairs = Float[np.ndarray, "B N N"]
 Places = Float[np.ndarray, "B N N 2"]
 Flags = Bool[np.ndarray, "B N N"]
 Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE`
@@ -120,7 +119,7 @@ class LocalFeatures(ExtendedFeatures):
 @compiled()
 def _write_ages_and_news(
     memory: Memory,
-    last_attempt: Pairs,
+    last_attempt: Float[np.ndarray, "B N N"],
     is_observed: Flags,
     believed_m: Places,
     now: Float[np.ndarray, "B"],

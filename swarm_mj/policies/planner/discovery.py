@@ -13,8 +13,6 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import TeamView
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 
-Purpose = Literal["discovery", "search", "plan"]
-
 
 class Discovery:
     """One mission's turns to transmit; row i of every result depends on robot i's buffer alone."""
@@ -46,7 +44,7 @@ class Discovery:
 
     def purpose(
         self, slot: int, is_known: Bool[np.ndarray, "N"], is_fresh: Bool[np.ndarray, "N"]
-    ) -> Purpose:
+    ) -> Literal["discovery", "search", "plan"]:
         """Return what a slot is for, by a snapshot: which robots it knows, and which are fresh."""
         if slot < self._search_slot:
             return "plan" if np.all(is_known) else "discovery"
