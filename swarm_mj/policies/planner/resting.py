@@ -8,9 +8,9 @@ robot takes its turns as in spatial TDMA. Without a payload they keep this plan.
 Under a channel that the robots do not know, some of its packets never arrive. With a payload,
 robots note what they decoded and what they missed (`link_tables.py`), and packets carry these
 counts of all robots, each as old as the rest of what they say of it. At common times every robot
-fits a table of links to what it then knows. Packets carry the best table: that
-of the robot whose knowledge is youngest. At the next common time each robot flies by a plan made
-from the best table that it holds, or goes on if the table says that links are as believed.
+fits a table of links to what it then knows. Packets carry the best table: that of the robot whose
+knowledge is youngest. At the next common time each robot flies by a plan made from the best table
+that it holds, or goes on if the table says that links are as believed.
 
 Where robots move, no two buffers hold the same positions for long, and schedules made from them
 would jam each other. A robot that hears of motion does as the planner of moving teams, or, without
@@ -50,20 +50,15 @@ NOT_YET = np.iinfo(np.int64).max
 
 
 class RestingPlanner(BroadcastPolicy):
-    """Robots make one plan when they know where all rest.
-
-    Until then they take turns. Uses the robot's own buffer, its identity, the team's size, the
-    clock, the radio's numbers, what the mission grants of the channel and a common order of turns;
-    and what packets say of links, if it learns.
-    """
+    """Robots make one plan when they know where all rest, and take turns until then."""
 
     def __init__(
         self, mission: Mission, settings: PlannerSettings | None = None, *, learns: bool = False
     ) -> None:
         """Prepare the policy, whose packets carry what robots observed of links, if it learns.
 
-        Robots that cannot plan take turns. If it learns, those that hear of motion follow the
-        planner of moving teams, unless only links fit into packets, as in some large teams.
+        If it learns, robots that hear of motion follow the planner of moving teams, unless only
+        links fit into packets, as in some large teams.
         """
         self._belief = Belief(radio=radio_of(mission))
         self._settings, self._learns = settings or PlannerSettings(), learns
