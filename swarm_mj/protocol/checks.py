@@ -37,9 +37,7 @@ def checked_decode(
     """Return whose packet each robot decodes; arguments as in `Channel`.
 
     The package's channels are trusted, and so fast. A user's own gets copies, which it may write.
-
-    Raises:
-        ValueError: A user's own channel answered what is no robot, or a robot that is silent.
+    Raises ValueError if it answered what is no robot, or a robot that is silent.
     """
     if is_ours(channel):
         return channel(position_m, recipient.copy())  # in the one layout it is compiled for

@@ -50,8 +50,7 @@ class Planner(BroadcastPolicy):
     def __init__(self, mission: Mission, settings: PlannerSettings | None = None) -> None:
         """Prepare the policy for the mission's team, in free space unless it is informed otherwise.
 
-        Raises:
-            ValueError: The mission's slots do not hold snapshots.
+        Raises ValueError if the mission's slots do not hold snapshots.
         """
         packet = packet_of(mission, snapshot_fields(mission))
         otherwise = ", or planner --payload none"
