@@ -159,7 +159,6 @@ class Swarm:
             raise ValueError(
                 f"packet() of {name_of(policy)} must return a Packet, not {packet!r:.80}"
             )
-        room = packet.num_entries
         # A policy's type says what it may know: a centre the truth, robots what they believe.
         if isinstance(policy, CentralisedPolicy):
             policy.inform(self.truth)
@@ -168,7 +167,7 @@ class Swarm:
         else:
             raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
         policy.start(self.mission.num_robots, self._rngs.policy)
-        self.buffers = with_room(self.buffers, room)
+        self.buffers = with_room(self.buffers, packet.num_entries)
         self._policy, self._window = policy, policy.window(self.mission)
         self._policy_is_ours = is_ours(policy)
 
