@@ -74,7 +74,7 @@ def test_a_team_is_measured_in_a_process_of_its_own():
 
 def test_a_team_that_does_not_fit_is_refused(monkeypatch):
     monkeypatch.setattr(needs, "free_memory", lambda: 1e9)
-    with pytest.raises(ValueError, match=r"5.86 GB of memory, and 1 GB are free; choose fewer"):
+    with pytest.raises(ValueError, match=r"5.84 GB of memory, and 1 GB are free; choose fewer"):
         next(team_rows(10_000, 0.1))
 
 
