@@ -47,7 +47,10 @@ def _call_base(
 
 
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
-    """Robots call their parent in a spanning tree, each with probability p (IV-C)."""
+    """Robots call their parent in a spanning tree (IV-C).
+
+    Each exchanges buffers with it with probability p.
+    """
 
     uses = "the true positions at the start: a robot talks to its parent in their spanning tree"
 

@@ -14,7 +14,10 @@ from swarm_mj.policies.policy import Parameters
 
 
 class GnnPolicy(LearnedPolicy):
-    """Every robot runs the same graph neural network, so one batch evaluates all of them."""
+    """Every robot runs the same graph neural network.
+
+    As they are alike, one batch evaluates all of them.
+    """
 
     def __init__(
         self,

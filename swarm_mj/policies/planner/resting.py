@@ -50,7 +50,10 @@ NOT_YET = np.iinfo(np.int64).max
 
 
 class RestingPlanner(BroadcastPolicy):
-    """Robots make one plan when they know where all rest, and take turns until then."""
+    """Robots make one plan when they know where all rest.
+
+    Until then they take turns.
+    """
 
     def __init__(
         self, mission: Mission, settings: PlannerSettings | None = None, *, learns: bool = False
