@@ -27,9 +27,9 @@ from swarm_mj.system.reading import read_file
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
-# All but sotdma, which is slow, and csma, which is younger than these results. The planners and gnn
-# are drawn under `paper` only: gnn was trained there, and they take several times as long as all
-# others together.
+# All but sotdma, which is slow, and those that sense, which are younger than these results. The
+# planners and gnn are drawn under `paper` only: gnn was trained there, and they take several times
+# as long as all others together.
 DRAWN = (
     "tdma",  # first: the others are compared to it
     *("random-flooding", "round-robin", "mst", "aloha", "gossip", "spatial-tdma"),

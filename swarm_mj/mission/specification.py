@@ -115,7 +115,13 @@ class Mission:
         -50.0, "noise power", "dBm", -200.0, 50.0, "transmit power follows it", group=CHANNEL
     )
     sensing_dbm: float | None = _radio(  # files of development versions lack it
-        None, "sensing threshold", "dBm", -200.0, 50.0, "power that csma senses", may_lack=True
+        None,
+        "sensing threshold",
+        "dBm",
+        -200.0,
+        50.0,
+        "power that csma and age-gain-csma sense",
+        may_lack=True,
     )
     frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
     failure_fraction: float = _number(

@@ -99,13 +99,16 @@ class AgeGainCsma(SensingPolicy):
 
     News is the age gain (Chen, Gatsis, Hassani and Shirani Bidokhti, Age of information in random
     access channels, 2022): by how much a packet lowers the ages at those who decode it. A robot
-    takes the rise of its mean T since its last packet for that, less what its neighbours learned
-    with it: of each packet that it decodes, the share of its range that the sender's covers. The
-    power that counts as busy changes from slot to slot: where it is low, fewer robots transmit, so
-    that packets get through weaker links.
+    estimates it as the rise of its mean T since its last packet. In a slot in which it decodes one,
+    the rise counts less, by the share of its range that the sender covers: neighbours there have
+    learned the same. The power that counts as busy changes from slot to slot: where it is low,
+    fewer robots transmit, so that packets get through weaker links.
     """
 
-    uses = "the power that it senses before it transmits, T, and where those are that it hears"
+    uses = (
+        "the power that it senses before it transmits, T, the clock, and the places of those it "
+        "hears"
+    )
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio."""

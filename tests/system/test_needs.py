@@ -35,6 +35,7 @@ def refusal(its_needs, output=None):
 
 
 def test_a_peak_outlasts_what_was_held():
+    Path("/proc/self/clear_refs").write_text("5")  # or the peak is that of an earlier test
     before = needs.peak_memory()
     assert before >= 0.9 * psutil.Process().memory_info().rss
     bytearray(b"1") * int(before)
