@@ -197,6 +197,13 @@ def test_policies_whose_packets_do_not_fit_are_not_suggested():
         assert f" --policy {names}" in dict(fly._next_commands(options, None))["Compare some:"]
 
 
+@pytest.mark.parametrize(("robots", "best"), [(80, "planner"), (81, "age-gain-csma")])
+def test_the_policy_with_the_lowest_age_for_that_team_is_suggested(robots, best):
+    options = fly.FlyOptions(mission=paper("random-walk", num_robots=robots), policy="tdma")
+    told = dict(fly._next_commands(options, None))["Compare some:"]
+    assert f" --policy tdma {best} random-flooding " in told
+
+
 def test_ctrl_c_leaves_a_readable_replay_of_what_was_flown(here, monkeypatch, capsys):
     def pressed(*arguments):
         for count, window in enumerate(rollout(*arguments), start=1):
