@@ -39,7 +39,7 @@ def talk(
         states.position_m,
         states.velocity_mps,
         states.is_active,
-        now + SLOT_WINDOWS * np.arange(num_slots)[:, None],
+        now,
         silence_is_attempt,
         radio.received_at_1_m_mw,
         radio.noise_mw,
@@ -60,7 +60,7 @@ def _talk(
     position_m: Float[np.ndarray, "B N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     is_active: Bool[np.ndarray, "B N"] | None,
-    now: Float[np.ndarray, "S B"],
+    now: Float[np.ndarray, "B"],
     silence_is_attempt: bool,
     received_at_1_m_mw: float,
     noise_mw: float,
@@ -68,12 +68,14 @@ def _talk(
     hears_while_sending: bool,
     said: Int[np.ndarray, "S 2 B N"],
 ) -> None:
-    write_attempt(last_attempt, said[0, 0], now[0], silence_is_attempt, is_active)
+    write_attempt(last_attempt, said[0, 0], now, silence_is_attempt, is_active)
+    time = now.copy()  # of the slot's end
     for slot in range(said.shape[0]):
         recipient, heard = said[slot, 0], said[slot, 1]
         if slot > 0:
             answer(said[slot - 1, 0], said[slot - 1, 1], recipient)
-        time = now[slot]
+        for b in range(time.shape[0]):
+            time[b] = now[b] + slot * SLOT_WINDOWS
         write_own(timestamp, believed_m, believed_mps, position_m, velocity_mps, time, is_active)
         silence(recipient, is_active)
         sender = decode_strongest(
