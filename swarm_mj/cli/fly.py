@@ -30,7 +30,6 @@ from swarm_mj.system.writing import Output, check_outputs, write_json
 
 REPLAYS = Path("replays")
 OTHERWISE = "name another place with --record, or leave it out with --no-record"
-COMPARED = ("planner", "tdma", "random-flooding")  # with what was flown, for a first comparison
 LARGE = 80  # robots, beyond which a plan takes long, and age-gain-csma has the lower age
 
 
@@ -120,8 +119,9 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
     if path:
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
     yield "Other policies:", f"{name} policies"
-    policies, is_large = [options.policy], options.mission.num_robots > LARGE
-    for other in ("age-gain-csma", *COMPARED[1:]) if is_large else COMPARED:
+    policies = [options.policy]
+    best = "age-gain-csma" if options.mission.num_robots > LARGE else "planner"
+    for other in (best, "tdma", "random-flooding"):
         with suppress(ValueError):  # its packets are larger than a slot
             registry.make_policy(other, options.mission)
             policies.append(other)

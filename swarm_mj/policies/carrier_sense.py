@@ -16,8 +16,8 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
+from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import TrueLinks
 from swarm_mj.system.compiled import compiled
@@ -62,7 +62,7 @@ class SensingPolicy(CentralisedPolicy):
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return `BROADCAST` for each robot that finds its channel idle."""
-        minislot, slot = self.minislots(views), round(float(views.now[0]) / SLOT_WINDOWS)
+        minislot, slot = self.minislots(views), int(slot_of(views.now)[0])
         sensed_mw = self._sensed_mw[slot % len(self._sensed_mw)]
         everyone = np.ones(minislot.shape, dtype=np.bool_)
         is_active = everyone if states.is_active is None else states.is_active
