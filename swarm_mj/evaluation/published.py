@@ -66,10 +66,6 @@ class Panel(NamedTuple):
     scale: Scale = "log"
 
 
-AOI = Panel("aoi", "age of information [windows]")
-VARIANCE = Panel("velocity_variance", "velocity variance [m²/s²]")
-
-
 @dataclass(frozen=True, kw_only=True)
 class ResultFigure:
     """One of the paper's result figures."""
@@ -81,7 +77,7 @@ class ResultFigure:
     x_label: str  # with its unit
     x_scale: Scale = "linear"
     irrelevant: tuple[str, ...] = ()  # fields that change nothing in this task
-    panels: tuple[Panel, ...] = (AOI,)
+    panels: tuple[Panel, ...]
 
     @property
     def name(self) -> str:
@@ -118,52 +114,27 @@ class ResultFigure:
         return ["evaluate", "--task", self.task, "--preset", preset, *swept]
 
 
-RECEPTIVE_FIELD = ResultFigure(
-    published="fig3_receptive_field",
-    title="Receptive field",
-    task="stationary",
-    x_name="receptive_field",
-    x_label="receptive field of the GNN [hops]",
-    irrelevant=("velocity_ratio",),
-    panels=(AOI._replace(scale="linear"),),
+_ALL = msgspec.toml.decode(
+    Path(__file__).with_name("result_figures.toml").read_bytes(), type=dict[str, ResultFigure]
 )
+
+RECEPTIVE_FIELD = _ALL["receptive_field"]
 """Stationary teams whose GNN looks one to several hops far (Fig. 3)."""
 
-TRANSMIT_POWER = ResultFigure(
-    published="fig4_transmit_power",
-    title="Transmit power",
-    task="stationary",
-    x_name="range_ratio",
-    x_label="range ratio: how far a packet reaches in silence [km]",
-    x_scale="log",
-    irrelevant=("velocity_ratio",),
-)
+TRANSMIT_POWER = _ALL["transmit_power"]
 """Stationary teams whose packets reach less or more far (Fig. 4)."""
 
-TEAM_SIZE = ResultFigure(
-    published="fig5_team_size",
-    title="Team size",
-    task="random-walk",
-    x_name="num_robots",
-    x_label="team size [robots]",
-)
+TEAM_SIZE = _ALL["team_size"]
 """Random walks of teams that are smaller or larger (Fig. 5)."""
 
-FLOCKING = ResultFigure(
-    published="fig6_flocking",
-    title="Flocking",
-    task="flocking",
-    x_name="velocity_ratio",
-    x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
-    panels=(AOI, VARIANCE),
-)
+FLOCKING = _ALL["flocking"]
 """Flocks that are slower or faster (Fig. 6)."""
 
-_ALL = (RECEPTIVE_FIELD, TRANSMIT_POWER, TEAM_SIZE, FLOCKING)
-RESULT_FIGURES = {figure.name: figure for figure in _ALL}
+AOI, VARIANCE = FLOCKING.panels
+RESULT_FIGURES = {figure.name: figure for figure in _ALL.values()}
 FIGURES = (FLOCK, *RESULT_FIGURES)
 # The figure that sweeps a field of a task's missions, all others as the paper sets them.
-SWEEPS = {figure.task: figure for figure in _ALL if figure.sweeps_missions}
+SWEEPS = {figure.task: figure for figure in _ALL.values() if figure.sweeps_missions}
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:

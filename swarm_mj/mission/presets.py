@@ -1,8 +1,10 @@
 """Missions whose numbers go together: the paper's text, its authors' code, and whole worlds."""
 
+import tomllib
 from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from swarm_mj.mission.specification import NOTHING, OPEN, Mission, Task
@@ -50,38 +52,9 @@ def world(preset: str, task: Task = "random-walk", **overrides: Any) -> Mission:
     return paper(task, **({"preset": preset} | WORLDS[preset] | overrides))
 
 
-# Where obstacles stand they make what is not in line of sight, so the channels are those of lines
-# of sight: means of 3GPP TR 38.901 v16, Tables 7.4.1-1 (slopes, shadowing) and 7.5-6 (correlation
-# distances, K in dB: 9 of UMi, 7 of InH and RMa).
-WORLDS: dict[str, dict[str, Any]] = {
-    # Free space between light walls is the multi-wall model (COST 231 1999, section 4.7).
-    "indoor": {
-        "arena": "rooms",
-        "shadowing_db": 3.0,  # InH, office
-        "shadowing_distance_m": 10.0,
-        "fading": "rician",
-        "rician_k": 5.0,  # 7 dB
-    },
-    # UMi, street canyon: 32.4 + 21 log10(d) + 20 log10(f) is free space up to 1 m. A block of 25 dB
-    # then is its loss without line of sight: 23 dB more at 200 m.
-    "urban": {
-        "arena": "blocks",
-        "path_loss": "log-distance",
-        "loss_exponent": 2.1,
-        "reference_m": 1.0,
-        "shadowing_db": 4.0,
-        "shadowing_distance_m": 10.0,
-        "fading": "rician",
-        "rician_k": 8.0,  # 9 dB
-    },
-    # Two-ray ground (Rappaport 2002), antennas as high as 3GPP's users carry theirs; K of RMa.
-    "open-field": {
-        "path_loss": "two-ray",
-        "antenna_height_m": 1.5,
-        "fading": "rician",
-        "rician_k": 5.0,  # 7 dB
-    },
-}
+WORLDS: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("worlds.toml").read_text(encoding="utf-8")
+)
 PAPERS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": reference}
 PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 

@@ -35,7 +35,8 @@ def code_digest() -> str:
     """Return a hash of the package's code and data, which changes before a commit, too."""
     package = Path(__file__).resolve().parents[1]
     digest = hashlib.sha256()
-    for path in sorted([*package.rglob("*.py"), *package.rglob("*.csv")]):
+    kinds = (".py", ".csv", ".toml")
+    for path in sorted(path for path in package.rglob("*") if path.suffix in kinds):
         digest.update(path.relative_to(package).as_posix().encode() + b"\0" + path.read_bytes())
     return digest.hexdigest()
 

@@ -64,7 +64,7 @@ def test_version_and_commit_are_the_installed_one_and_git_s_own():
     assert packages.version() == metadata.version("swarm_mj")
     command = ["git", "-C", str(ROOT), "rev-parse", "HEAD"]
     head = subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
-    assert head.startswith(commit().rstrip("+"))
+    assert head.startswith(str(commit()).rstrip("+"))
 
 
 @pytest.fixture
@@ -78,12 +78,13 @@ def package(tmp_path, monkeypatch):
 
 def test_the_digest_tells_code_and_data_apart(package):
     seen = {code_digest()}
-    for name, content in [("a.py", "1"), ("a.py", "2"), ("b.csv", ""), ("c.py", "")]:
+    written = [("a.py", "1"), ("a.py", "2"), ("b.csv", ""), ("c.py", ""), ("d.toml", "")]
+    for name, content in written:
         (package / name).write_text(content)
         seen.add(code_digest())
     (package / "note.txt").write_text("no code")
     assert code_digest() in seen
-    assert len(seen) == 5
+    assert len(seen) == 6
 
 
 def test_only_the_package_makes_a_commit_unclean(package):
@@ -97,7 +98,7 @@ def test_only_the_package_makes_a_commit_unclean(package):
     git("add", ".")
     git("commit", "--quiet", "--message", "first")
     clean = commit()
-    assert len(clean) == 12
+    assert len(str(clean)) == 12
     assets = package.parent / "assets"
     (assets / "figures").mkdir(parents=True)
     (assets / "figures" / "fig4.svg").write_text("drawn from results")

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import NamedTuple, cast
 
 import matplotlib.style
+import msgspec
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
-from swarm_mj.policies.registry import WITHOUT_PAYLOAD
 from swarm_mj.system.writing import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
@@ -40,31 +40,9 @@ class Look(NamedTuple):
     width: float = 1.4  # of the line [pt]
 
 
-LOOKS = {
-    "random-flooding": Look("random flooding", "#e69f00", "o"),
-    "round-robin": Look("round robin", "#56b4e9", "s"),
-    "mst": Look("MST", "#009e73", "^"),
-    "aloha": Look("slotted ALOHA", "#999933", "v"),
-    "csma": Look("CSMA", "#661100", ">"),
-    "age-gain-csma": Look("age-gain CSMA", "#2244ee", "8"),
-    "gossip": Look("gossip", "#882255", "P", size=5.0),
-    "tdma": Look("TDMA", "#0072b2", "D", size=4.0),
-    "spatial-tdma": Look("spatial TDMA", "#332288", "h", size=5.5),
-    "planner": Look("planner", "#80391e", "d"),
-    WITHOUT_PAYLOAD: Look("planner, no payload", "#a6d854", "<"),
-    "gnn": Look("gnn (T, M, P only)", "#d55e00", "*", size=8.0),
-    "greedy-oracle": Look("greedy oracle", "#000000", ".", size=5.0, width=0.8),
-    "GNN": Look("GNN", "#cc79a7", "X"),
-    "linear GNN": Look("GNN, linear", "#5e16d8", "p"),
-    "GNN generalized from 0.25": Look("GNN, from 0.25", "#5e16d8", "p"),
-    "GNN trained at each size": Look("GNN, each size", "#cc79a7", "X"),
-    "GNN generalized from 40": Look("GNN, from 40", "#5e16d8", "p"),
-    BETTER: Look("the paper's GNN", "#cc79a7", "X"),
-    "GNN with shared reward": Look("GNN, shared reward", "#180048", "H"),
-    "GNN with credit per robot": Look("GNN, own credit", "#180048", "H"),
-    "GNN trained on AoI": Look("GNN, on AoI", "#cc79a7", "X"),
-    "GNN trained on velocity variance": Look("GNN, on variance", "#5e16d8", "p"),
-}
+LOOKS = msgspec.toml.decode(
+    Path(__file__).with_name("looks.toml").read_bytes(), type=dict[str, Look]
+)
 
 
 def look_of(method: str) -> Look:
