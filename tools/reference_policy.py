@@ -20,7 +20,7 @@ import torch
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.batch import fly_batch
-from swarm_mj.evaluation.flying import run_jobs
+from swarm_mj.evaluation.engines import Local
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import reference
 from swarm_mj.policies.gnn.network import AggregationGnn
@@ -98,7 +98,7 @@ def costs_of(policy: Path, episodes: int, seed: int, num_jobs: int) -> list[floa
     study = Study(
         policies=(str(policy),), regimes=(reference("stationary"),), episodes=episodes, seed=seed
     )
-    flown = dict(run_jobs(fly_batch, study.batches, num_jobs))
+    flown = dict(Local(num_jobs=num_jobs).run(fly_batch, study.batches))
     return [aoi for index in sorted(flown) for aoi in flown[index].aoi]
 
 

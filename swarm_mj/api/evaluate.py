@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.engines import Local
 from swarm_mj.evaluation.flying import fly_study
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
@@ -175,7 +176,7 @@ def evaluate(
     check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}
     with memory_errors():
-        fly_study(study, costs, num_jobs, None, quiet_console())
+        fly_study(study, costs, Local(num_jobs=num_jobs), None, quiet_console())
     return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
 
 

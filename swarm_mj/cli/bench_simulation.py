@@ -18,7 +18,7 @@ from mujoco._structs import MjData
 
 from swarm_mj.api.fly import compile_ahead, flight_needs
 from swarm_mj.evaluation.batch import fly_batch
-from swarm_mj.evaluation.flying import run_jobs
+from swarm_mj.evaluation.engines import Local
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission, paper
@@ -148,7 +148,7 @@ def _flying_s(
     """Return the wall time of an evaluation's missions [s]."""
     study = Study(policies=policies, regimes=(mission,), episodes=num_episodes)
     start_s = time.perf_counter()
-    list(run_jobs(fly_batch, study.batches, num_jobs))
+    list(Local(num_jobs=num_jobs).run(fly_batch, study.batches))
     return time.perf_counter() - start_s
 
 

@@ -16,6 +16,7 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.engines import Local
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
@@ -118,7 +119,7 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     try:
         keep = partial(flying.append_progress, kept, header) if kept else None
         with memory_errors():
-            flying.fly_study(study, costs, options.jobs, keep, console)
+            flying.fly_study(study, costs, Local(num_jobs=options.jobs), keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         ending = "Out of memory" if is_memory else "Interrupted"

@@ -1,4 +1,4 @@
-"""The flights of a study: in several processes, kept one by one, so that a study can be resumed.
+"""The flights of a study, kept one by one, so that a study can be resumed.
 
 The progress file holds whole lines, each a digest and JSON: first what the batches depend on, then
 one batch a line, its index and its costs. A line's digest is of the first line's JSON and its own,
@@ -7,36 +7,23 @@ JSON gives floats back as they were, so a resumed evaluation ends in the same fi
 """
 
 import hashlib
-import os
-import signal
-from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
-from concurrent.futures import ProcessPoolExecutor, as_completed
-from concurrent.futures.process import BrokenProcessPool
-from contextlib import closing, contextmanager
-from multiprocessing import get_context, resource_tracker
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import closing
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import msgspec
 import numpy as np
 from rich.console import Console
 
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
+from swarm_mj.evaluation.engines import Engine
 from swarm_mj.evaluation.study import Study
-from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
-from swarm_mj.system.processes import guard
+from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.reading import read_file
 from swarm_mj.system.terminal import WorkBar
 from swarm_mj.system.writing import append_bytes, write_bytes
 
-Piece = TypeVar("Piece")
-Product = TypeVar("Product")
-
-# Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
-# look for a window system, which it does by a program that complains if it is left.
-SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
-# Nor does any import modules of the current folder, as `python -c` would.
-SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 MAX_BYTES = 2**32  # four times what 100 000 missions of 40 policies take
 
 
@@ -48,7 +35,7 @@ def num_flown(study: Study, costs: Mapping[int, BatchCosts]) -> int:
 def fly_study(
     study: Study,
     costs: dict[int, BatchCosts],
-    num_jobs: int,
+    engine: Engine,
     keep: Callable[[int, BatchCosts], None] | None,
     console: Console,
 ) -> None:
@@ -60,7 +47,7 @@ def fly_study(
         KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
-    flown = run_jobs(fly_batch, [study.batches[index] for index in left], num_jobs)
+    flown = engine.run(fly_batch, [study.batches[index] for index in left])
     bar = WorkBar(
         "Flying",
         study.num_missions,
@@ -78,57 +65,6 @@ def fly_study(
             if is_interrupted():
                 raise KeyboardInterrupt
             bar.advance(len(study.batches[index].seeds))
-
-
-def run_jobs(
-    work: Callable[[Piece], Product], pieces: Sequence[Piece], num_jobs: int
-) -> Generator[tuple[int, Product]]:
-    """Do all pieces of work; yield each one's index and product, in the order they are done.
-
-    One of `num_jobs` is this process itself. Others import `work`, and pieces and products are
-    pickled on the way. Ctrl-C reaches this process only; the others end with it, however it ends.
-
-    Raises:
-        OSError: A process ended before its work did.
-        Exception: What `work` raised of the first piece that failed.
-    """
-    num_jobs = min(num_jobs, len(pieces))
-    if num_jobs <= 1:
-        yield from ((index, work(piece)) for index, piece in enumerate(pieces))
-        return
-    # Forked processes would inherit locks that MuJoCo's threads hold.
-    with guard() as watch, ProcessPoolExecutor(num_jobs, get_context("spawn")) as pool:
-        with deferred_interrupt() as is_interrupted, _inherited():
-            futures = {pool.submit(work, piece): index for index, piece in enumerate(pieces)}
-            # The pool itself leaves its processes waiting for work for ever if this one is killed.
-            for process in pool._processes.values():
-                watch(process.pid or 0)
-        try:
-            if is_interrupted():
-                raise KeyboardInterrupt
-            for future in as_completed(futures):
-                yield futures[future], future.result()
-        except BrokenProcessPool:
-            raise OSError("a job was ended from outside, perhaps for want of memory") from None
-        finally:
-            for process in list(pool._processes.values()):
-                process.kill()  # without waiting for the pieces under way
-
-
-@contextmanager
-def _inherited() -> Iterator[None]:
-    """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
-    before = dict(os.environ)
-    os.environ.update(SURROUNDINGS)
-    resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
-    try:
-        yield
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for name in SURROUNDINGS.keys() - before.keys():
-            del os.environ[name]
-        os.environ.update(before)
 
 
 def progress_path(output: Path) -> Path:

@@ -25,14 +25,14 @@ BUSY = '''"""Computes."""
 import sys
 from dataclasses import dataclass
 from swarm_mj.cli import script
-from swarm_mj.evaluation.flying import run_jobs
+from swarm_mj.evaluation.engines import Local
 @dataclass
 class Options:
     pass
 def busy(piece):
     return sum(range(10**9))
 if __name__ == "__main__":
-    sys.exit(script(Options, lambda _: len(list(run_jobs(busy, [1, 2], 2)))))
+    sys.exit(script(Options, lambda _: len(list(Local(num_jobs=2).run(busy, [1, 2])))))
 '''
 
 
