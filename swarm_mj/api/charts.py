@@ -70,7 +70,7 @@ def draw_flight(
 def draw_evaluation(results: Sequence[Result]) -> Figure:
     """Return a chart of policies by missions, the lowest age first; flocks have variances, too."""
     groups = {said: list(its) for said, its in groupby(results, missions_of)}
-    titles = [_lines(said) for said in groups]
+    titles = [textwrap.wrap(said, CHARACTERS, break_on_hyphens=False) for said in groups]
     heights_in = [
         HEAD_IN + LINE_IN * (len(title) - 1) + ROW_IN * len(shown)
         for title, shown in zip(titles, groups.values(), strict=True)
@@ -109,10 +109,6 @@ def draw_learning(
         axes.legend(frameon=False)
         write_caption(figure, origin)
     return kept(figure)
-
-
-def _lines(said: str) -> list[str]:
-    return textwrap.wrap(" ".join(said.split()), CHARACTERS, break_on_hyphens=False)
 
 
 def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:

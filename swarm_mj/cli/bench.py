@@ -7,18 +7,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli.bench_simulation import (
-    GROWING,
-    NUM_FITTED,
-    Row,
-    draw_teams,
-    evaluation_rows,
-    growth,
-    plain_step_us,
-    simulation_rows,
-    team_rows,
-    world_rows,
-)
+from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
 from swarm_mj.system.fields import setting
 from swarm_mj.system.packages import need
@@ -67,12 +56,12 @@ def run(options: BenchOptions) -> int:
         _check_teams(set(options.robots))
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
-    tables, steps_us = [], [plain_step_us(options.seconds / 4)]
+    tables, steps_us = [], [sim.plain_step_us(options.seconds / 4)]
     with Console(stderr=True).status("Measuring ...") as status:
         tables_of = _team_tables if options.robots or options.plot else _tables
         for table in tables_of(options, status.update):
             tables.append(table)
-            steps_us.append(plain_step_us(options.seconds / 4))
+            steps_us.append(sim.plain_step_us(options.seconds / 4))
     Console(highlight=False).print(*tables, sep="\n")
     plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
     return 0
@@ -100,34 +89,33 @@ def _team_tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[
     for num_robots in sorted(set(options.robots)):
         say(f"Measuring {num_robots} robots ...")
         try:
-            teams[str(num_robots)] = list(team_rows(num_robots, options.seconds))
+            teams[str(num_robots)] = list(sim.team_rows(num_robots, options.seconds))
         except ValueError as error:
             plain_console(is_error=True).print(f"{num_robots} robots are left out: {error}")
     _check_teams(teams)
-    powers = " and ".join(f"{name}: N^{growth(teams, name)[0]:.2f}" for name in GROWING)
-    yield _table(
-        f"Growth of the {min(NUM_FITTED, len(teams))} largest teams: {powers}", teams, head="robots"
-    )
+    powers = " and ".join(f"{name}: N^{sim.growth(teams, name)[0]:.2f}" for name in sim.GROWING)
+    title = f"Growth of the {min(sim.NUM_FITTED, len(teams))} largest teams: {powers}"
+    yield _table(title, teams, head="robots")
     if options.plot:
-        draw_teams(teams, options.plot)
+        sim.draw_teams(teams, options.plot)
 
 
 def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:
     """Make all requested measurements, and print which one is running."""
     say("Measuring missions side by side ...")
     columns = {
-        str(num_missions): list(simulation_rows(num_missions, options.threads, options.seconds))
+        str(num_missions): list(sim.simulation_rows(num_missions, options.threads, options.seconds))
         for num_missions in options.missions
     }
     title = "Simulation: 40 robots walk at random, policy round-robin"
     yield _table(title, columns, head="missions side by side")
     say("Measuring obstacles and fading ...")
     title = f"World: one window of one of {WORLD_MISSIONS} such missions"
-    yield _table(title, {"": list(world_rows(WORLD_MISSIONS, options.seconds))})
+    yield _table(title, {"": list(sim.world_rows(WORLD_MISSIONS, options.seconds))})
     if options.episodes:
         say(f"Measuring an evaluation of {options.episodes} missions ...")
         title = f"Evaluation: {options.episodes} random walks of 40 robots, 500 windows each"
-        rows = evaluation_rows(options.episodes, options.jobs, options.seconds)
+        rows = sim.evaluation_rows(options.episodes, options.jobs, options.seconds)
         yield _table(title, {"": list(rows)})
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
@@ -137,7 +125,7 @@ def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table
         yield _table("Learning: 40 robots at rest", {"": list(rows)})
 
 
-def _table(title: str, columns: Mapping[str, Sequence[Row]], head: str = "") -> Table:
+def _table(title: str, columns: Mapping[str, Sequence[sim.Row]], head: str = "") -> Table:
     """Return a table of columns with rows of the same names; `head` stands above these names."""
     table = Table(title=title, title_justify="left", show_header=bool(head))
     table.add_column(head)

@@ -1,6 +1,5 @@
 """`swarm-mj figures`: draws the paper's figures from result files."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -10,7 +9,7 @@ from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.policies.registry import stored_policies
-from swarm_mj.system.fields import setting
+from swarm_mj.system.fields import check_choice, setting
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
@@ -55,7 +54,9 @@ def run(options: FiguresOptions) -> int:
         from swarm_mj.evaluation.figures.flock import draw_flock
         from swarm_mj.evaluation.figures.style import LOOKS, save
 
-        _check_methods(options.policy, [*LOOKS, *(result.policy for result in results)])
+        methods = dict.fromkeys([*LOOKS, *(result.policy for result in results)])
+        for method in options.policy:
+            check_choice("policy", method, methods)
         policy, seed = options.flock_policy, options.flock_seed
         drawn = {}
         for name in sorted(paths, key=FLOCK.__eq__):  # it flies, and what is refused comes first
@@ -76,13 +77,6 @@ def run(options: FiguresOptions) -> int:
     if left_out := ", ".join(name for name in paths if name not in drawn):
         console.print(f"Left out {left_out}: the results hold no point of them")
     return 0
-
-
-def _check_methods(methods: Sequence[str], known: Sequence[str]) -> None:
-    for method in methods:
-        if method not in known:
-            every = ", ".join(dict.fromkeys(known))
-            raise ValueError(f"policy must be one of {every}, not {method!r}")
 
 
 def _paths(options: FiguresOptions) -> dict[str, list[Path]]:

@@ -111,11 +111,13 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
 
 
 def _print_one(each: dict[str, Any], mission: Mission) -> None:
+    names = ["T, M, P"] + ([] if each["payload"] == "none" else [each["payload"]])
+    carried = [f"{name}: {CARRIED[name]}" if name in CARRIED else name for name in names]
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         "in a window": WINDOWS[each["window"]],
-        "packets carry": "\n".join(_carried(each)),
+        "packets carry": "\n".join(carried),
         "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},
         "source": each["class"],
@@ -131,12 +133,6 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
     policy = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
     fly = f"{this_command()} fly --policy {policy} {mission_flags(mission)}"
     plain_console().print(f"{each['description']}\n\nFly it:  {fly}")
-
-
-def _carried(each: dict[str, Any]) -> list[str]:
-    """Return what its packets carry, and what that means where it is known."""
-    names = ["T, M, P"] + ([] if each["payload"] == "none" else [each["payload"]])
-    return [f"{name}: {CARRIED[name]}" if name in CARRIED else name for name in names]
 
 
 def _described(mission: Mission) -> str:

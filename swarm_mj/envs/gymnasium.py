@@ -20,6 +20,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
 from swarm_mj.replay.view import has_display
+from swarm_mj.system.fields import check_choice
 
 MODES = ("rgb_array", "human")
 WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
@@ -44,8 +45,8 @@ class Screen:
 
     def __init__(self, mode: str | None, modes: Sequence[str] = MODES) -> None:
         """Take a render mode, or None for no pictures; raises ValueError for an unknown one."""
-        if mode is not None and mode not in modes:
-            raise ValueError(f"render_mode must be one of {', '.join(modes)}, not {mode!r}")
+        if mode is not None:
+            check_choice("render_mode", mode, modes)
         self.mode, self._shown_s = mode, 0.0
         self._renderer: SceneRenderer | None = None
         self._viewer: SceneViewer | None = None

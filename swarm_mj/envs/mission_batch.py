@@ -71,7 +71,14 @@ class MissionBatch:
             self.swarm.restart(seeds)
         self.seeds = list(seeds)
         self.last_window = last_window or self.mission.num_windows
-        self.costs: WindowCosts | None = None  # of the last window
+        # Of the last window. Before the first nothing is known and nothing was sent.
+        self.costs = WindowCosts(
+            *age_of_information(self.swarm.buffers, self.swarm.now),
+            velocity_variance(self.swarm.states.velocity_mps),
+            counts=np.zeros((2, 5, self.num_missions)),
+            is_broadcast=False,
+            task_cost=self.swarm.task_cost(),
+        )
         self.recipients: list[np.ndarray] = []  # of the windows flown, if they are kept
         self._extractor.start(self.num_missions, self.mission.num_robots)
         self._see()
@@ -160,20 +167,12 @@ class MissionBatch:
         Names and numbers are those of `swarm-mj fly --json`. Before the first window, when nothing
         is known and nothing was sent, ages and packets are 0.
         """
-        swarm, costs = self.flown, self.costs
+        costs, packets = self.costs, self.costs.packets
         infos: Info = {"seed": np.array(self.seeds)}
-        if costs is None:
-            infos["age_windows"], is_complete = age_of_information(swarm.buffers, swarm.now)
-            infos["velocity_variance_m2ps2"] = velocity_variance(swarm.states.velocity_mps)
-            infos["is_complete"] = is_complete
-            infos |= {f"packets_{name}": np.zeros(self.num_missions) for name in PACKETS}
-            task_cost = swarm.task_cost()
-        else:
-            for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
-                infos[name] = getattr(costs, name)
-            infos |= {f"packets_{name}": getattr(costs.packets, name) for name in PACKETS}
-            task_cost = costs.task_cost
-        return infos if task_cost is None else infos | {"task_cost": task_cost.value}
+        for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
+            infos[name] = getattr(costs, name)
+        infos |= {f"packets_{name}": getattr(packets, name) for name in PACKETS}
+        return infos if costs.task_cost is None else infos | {"task_cost": costs.task_cost.value}
 
     def first(self) -> tuple[Observation, Info]:
         """Return the first mission's view and infos, for environments of a single mission."""

@@ -20,6 +20,7 @@ from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
+from swarm_mj.system.fields import check_choice
 
 
 def make_batch(
@@ -106,8 +107,7 @@ def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, An
 
 
 def _check_reward(reward: str, mission: Mission, controller: Controller | None) -> None:
-    if reward not in REWARDS:
-        raise ValueError(f"reward must be one of {', '.join(REWARDS)}, not {reward!r}")
+    check_choice("reward", reward, REWARDS)
     if reward == "task-cost" and not isinstance(controller or controller_of(mission), Costed):
         raise ValueError(
             f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "

@@ -19,6 +19,7 @@ from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import Activation, MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
+from swarm_mj.system.fields import check_choice
 from swarm_mj.system.packages import commit, version
 
 # Of networks that can be stored as policies.
@@ -49,8 +50,7 @@ def make_vec_env(
         ValueError: A value is unknown or out of range.
         TypeError: An option is unknown.
     """
-    if agent not in AGENTS:
-        raise ValueError(f"agent must be one of {', '.join(AGENTS)}, not {agent!r}")
+    check_choice("agent", agent, AGENTS)
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
     if agent == "robot":

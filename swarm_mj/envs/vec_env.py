@@ -70,7 +70,7 @@ class SwarmVecEnv(VecEnv):
             reward[envs] = paid[:, : self._per_mission(batch)].ravel() / self.reward_unit
             done[envs] = batch.is_over
         # Of this window: a restart, below, forgets them.
-        self.costs = [batch.costs for batch in self.batches if batch.costs is not None]
+        self.costs = [batch.costs for batch in self.batches]
         seen, infos = self._observe(), self._infos()
         if done.any():
             for env in np.flatnonzero(done & self._is_truncated()):

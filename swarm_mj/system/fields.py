@@ -5,7 +5,7 @@ line at once.
 """
 
 import inspect
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable
 from dataclasses import MISSING, Field, field, fields
 from difflib import get_close_matches
 from functools import partial
@@ -169,7 +169,7 @@ def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     label = called or allowed.get("label", spec.name)
     kind, described = KINDS.get(kind_of(spec), (object, ""))
     if "choices" in allowed:
-        _check_choice(label, value, allowed["choices"], is_joined=allowed.get("is_joined", False))
+        check_choice(label, value, allowed["choices"], is_joined=allowed.get("is_joined", False))
     is_number = not isinstance(value, bool)  # Python's True is 1
     is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
     limits = ""
@@ -182,8 +182,10 @@ def check_value(spec: Field[Any], value: object, called: str = "") -> None:
         raise ValueError(f"{label} must be {described}{limits}, not {shown}")
 
 
-def _check_choice(label: str, value: object, choices: Sequence[str], *, is_joined: bool) -> None:
-    """Pass if a value is one of the choices, or several of them joined by commas."""
+def check_choice(
+    label: str, value: object, choices: Collection[str], *, is_joined: bool = False
+) -> None:
+    """Raise ValueError unless a value is one of the choices, or some of them joined by commas."""
     typed = [value]
     if is_joined and isinstance(value, str):
         typed = [each.strip() for each in value.split(",")]

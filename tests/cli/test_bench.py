@@ -2,7 +2,7 @@
 
 import pytest
 
-from swarm_mj.cli import bench, bench_learning, main
+from swarm_mj.cli import bench_learning, bench_simulation, main
 from swarm_mj.cli.bench import noise
 from swarm_mj.cli.bench_simulation import Row
 
@@ -48,7 +48,7 @@ def teams(monkeypatch, here):
         yield Row("window, ms", small + 2.0 * num_robots**1.5, "{:,.1f}")
         yield Row("team, MB", small + 3.0 * num_robots**2.0, "{:,.1f}")
 
-    monkeypatch.setattr(bench, "team_rows", rows)
+    monkeypatch.setattr(bench_simulation, "team_rows", rows)
     return here
 
 
