@@ -9,13 +9,14 @@ UV := $(BIN)/uv pip install --python $(BIN)/python --quiet
 ARGS ?=
 SCALE ?= quick
 
-.PHONY: help setup setup-dev fly bench check test test-all attack lock audit format figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check test test-all attack reference lock audit format figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
 	@echo "make test    set up if needed and run the tests, each law once"
 	@echo "make test-all  run the long tests, too: many seeds, a built wheel, the site"
 	@echo "make attack  run the fault tests for ten minutes and count what held"
+	@echo "make reference  ask the network simulator ns-3 again (Linux on x86-64, with g++)"
 	@echo "make check   formatter, linter and type checker"
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
@@ -79,6 +80,17 @@ test-all: $(DEV)
 
 attack: $(DEV)
 	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)
+
+reference: setup .venv/ns3/ready
+	$(BIN)/python training/reference/ns3.py $(ARGS)
+
+# For its headers and libraries only; the Python interface, whose compiler takes half an hour to build, is
+# left out, so any Python will do.
+.venv/ns3/ready: Makefile
+	@echo "Installing ns-3 in .venv/ns3 (320 MB) ..."
+	@$(PIP) --target .venv/ns3 --upgrade --no-deps --only-binary :all: --python-version 3.11 \
+	  --platform manylinux_2_28_x86_64 ns3==3.44.post0
+	@touch $@
 
 # What torch alone needs comes with it.
 OF_TORCH := torch triton cuda-bindings cuda-pathfinder cuda-toolkit nvidia-cublas nvidia-cuda-cupti \

@@ -45,7 +45,7 @@ class VaryingChannel(Protocol):
 
 def path_loss_db(distance_m: float, frequency_hz: float) -> float:
     """Return the free-space path loss over a distance [dB] (Eq. 1)."""
-    # 147.55 is the paper's; 20 log10(c / 4 pi) with the speed of light c is 147.5522.
+    # The paper rounds 20 log10(c / 4 pi), 147.5522: all that sets our powers apart from ns-3's.
     return 20.0 * math.log10(distance_m) + 20.0 * math.log10(frequency_hz) - 147.55
 
 
