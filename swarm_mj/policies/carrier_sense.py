@@ -19,7 +19,6 @@ from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.window import LocalViews
-from swarm_mj.radio.mission_radio import TrueLinks
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
 
@@ -52,16 +51,12 @@ class SensingPolicy(CentralisedPolicy):
         """Take the powers from which a channel is busy, of the slots in turn."""
         self._sensed_mw = [from_db(each) for each in sensed_dbm]
 
-    def inform(self, truth: TrueLinks) -> None:
-        """Take the true channel, whose mean powers robots sense."""
-        self._truth = truth
-
     @abstractmethod
     def minislots(self, views: LocalViews) -> Float[np.ndarray, "B N"]:
         """Return each robot's minislot; it is infinite if the robot does not want to transmit."""
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """Return `BROADCAST` for each robot that finds its channel idle."""
+        """Return `BROADCAST` for robots that find their channel idle, by the true mean powers."""
         minislot, slot = self.minislots(views), int(slot_of(views.now)[0])
         sensed_mw = self._sensed_mw[slot % len(self._sensed_mw)]
         everyone = np.ones(minislot.shape, dtype=np.bool_)

@@ -37,10 +37,6 @@ class GreedyOracle(CentralisedPolicy):
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
         self._truth = TrueLinks(radio=radio_of(mission))
 
-    def inform(self, truth: TrueLinks) -> None:
-        """Plan with the true channel from now on."""
-        self._truth = truth
-
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the window's schedule; robots move before they talk, which it does not foresee."""
         timestamp = (SLOTS_PER_WINDOW * views.buffers.timestamp).astype(np.float32)

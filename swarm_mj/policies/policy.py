@@ -63,7 +63,8 @@ class DecentralisedPolicy(Policy, ABC):
     """A policy that every robot evaluates on its own view (Eq. 9)."""
 
     def inform(self, belief: Belief) -> None:
-        """Receive, before `start`, what all robots know of the channel; ignored by default."""
+        """Receive, before `start`, what all robots know of the channel."""
+        self._belief = belief
 
     @abstractmethod
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
@@ -117,20 +118,10 @@ class TeamView(NamedTuple):
 
 def team_views(views: LocalViews) -> list[TeamView]:
     """Return the views mission by mission, for policies that remember each on its own."""
-    buffers, is_known = views.buffers, views.buffers.is_known
+    now, buffers = views.now.tolist(), views.buffers
     heard = views.phases[-1].heard if views.phases else views.silence
-    return [
-        TeamView(
-            now=float(views.now[b]),
-            is_known=is_known[b],
-            timestamp=buffers.timestamp[b],
-            position_m=buffers.position_m[b],
-            velocity_mps=buffers.velocity_mps[b],
-            parent=buffers.parent[b],
-            heard=heard[b],
-        )
-        for b in range(len(views.now))
-    ]
+    known = buffers.is_known, buffers.timestamp, buffers.position_m, buffers.velocity_mps
+    return [TeamView(*its) for its in zip(now, *known, buffers.parent, heard, strict=True)]
 
 
 class CentralisedPolicy(Policy, ABC):
@@ -139,7 +130,8 @@ class CentralisedPolicy(Policy, ABC):
     is_centralised = True  # unless the truth stands in for what each robot senses
 
     def inform(self, truth: TrueLinks) -> None:
-        """Receive, before `start`, the true links before their fades; ignored by default."""
+        """Receive, before `start`, the true links before their fades."""
+        self._truth = truth
 
     @abstractmethod
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:

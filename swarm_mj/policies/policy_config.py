@@ -3,6 +3,7 @@
 import itertools
 import json
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -11,6 +12,7 @@ from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features
 from swarm_mj.system.fields import check, setting
 
 SUFFIX = ".safetensors"  # of a stored policy's file
+CARD = Path(__file__).with_name("card.md")
 Edges = Literal["paper", "reference", "both"]
 Activation = Literal["tanh", "relu"]
 Weights = dict[str, np.ndarray]  # by name
@@ -129,21 +131,11 @@ def model_card(config: GnnConfig | MlpConfig) -> str:
         flags.append(f"--robots {config.network.num_robots}")
     if is_own_set(config.features):
         flags.append(f"--features {config.features}")
-    return f"""\
-# A learned communication policy of swarm_mj
-
-Every robot evaluates {kind} on the `{config.features}` features of its own
-buffer, and draws from the result which robot it addresses in the next window, or that it stays
-silent. Packets carry T, M and P, as the paper's, and nothing more.
-
-    swarm-mj fly --policy FILE --task {" ".join(flags)}
-
-`FILE` is the `{SUFFIX}` file that holds this card; `swarm-mj evaluate` takes it too.
-{teams}
-
-```json
-{json.dumps(asdict(config), indent=2)}
-```
-
-Licence: Apache-2.0, as swarm_mj.
-"""
+    return CARD.read_text(encoding="utf-8").format(
+        kind=kind,
+        features=config.features,
+        flags=" ".join(flags),
+        suffix=SUFFIX,
+        teams=teams,
+        config=json.dumps(asdict(config), indent=2),
+    )

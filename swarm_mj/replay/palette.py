@@ -52,6 +52,10 @@ def dim(colour: Colour, share: float) -> Colour:
     return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
 
 
+BELIEF_ERROR: Colour = dim(BELIEF, 0.8)
+LOST_REST: Colour = dim(LOST, 0.5)  # of the way that a lost packet did not come
+
+
 class PacketStyle(NamedTuple):
     """How packets with the same fate are drawn in space."""
 

@@ -1,7 +1,9 @@
 """A replay as rerun's recording: how each entity looks, and its rows on the mission's timelines."""
 
 import math
+import tomllib
 from collections.abc import Iterable, Sequence
+from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -11,7 +13,7 @@ from jaxtyping import Float, Int
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import NUMBERS, LinkRows, Points, shades
-from swarm_mj.replay.palette import PACKETS, Colour, dim
+from swarm_mj.replay.palette import PACKETS, Colour
 from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
@@ -35,45 +37,18 @@ class EntityStyle(NamedTuple):
         return {radii: -self.width, **order, **colours}  # rerun takes negative radii as points
 
 
-LAYERS = {
-    "arena/area/grid": EntityStyle(rr.LineStrips2D, palette.GRID, 0.5, -20.0),
-    "arena/area/outline": EntityStyle(rr.LineStrips2D, palette.OUTLINE, 1.5, -19.0),
-    "arena/area/walls": EntityStyle(rr.LineStrips2D, palette.WALL, 1.5, -19.0),
-    "arena/world/filling": EntityStyle(rr.LineStrips2D, palette.OBSTACLE, 0.5, -11.0),
-    "arena/world/obstacle": EntityStyle(rr.LineStrips2D, palette.WALL, 0.8, -10.0),
-    "arena/trail": EntityStyle(rr.LineStrips2D, palette.TRAIL, 1.0, -5.0),
-    "arena/radio/range": EntityStyle(rr.Ellipses2D, palette.RANGE, 0.6, 1.0),
-    "arena/world/unbelieved": EntityStyle(rr.LineStrips2D, None, 0.6, 2.0),
-    "arena/world/too_weak": EntityStyle(rr.LineStrips2D, None, 0.5, 2.5),
-    "arena/belief/error": EntityStyle(rr.LineStrips2D, dim(palette.BELIEF, 0.8), 0.6, 3.0),
-    "arena/belief/ring": EntityStyle(rr.Ellipses2D, palette.BELIEF, 0.8, 4.0),
-    "arena/tree": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 6.0),
-    "arena/radio/overheard": EntityStyle(rr.LineStrips2D, PACKETS["overheard"].colour, 0.7, 10.0),
-    "arena/radio/heard": EntityStyle(rr.LineStrips2D, palette.BROADCAST, 1.0, 18.0),
-    "arena/radio/unanswered": EntityStyle(rr.Arrows2D, PACKETS["unanswered"].colour, 1.2, 18.0),
-    "arena/radio/lost/rest": EntityStyle(rr.LineStrips2D, dim(palette.LOST, 0.5), 0.7, 18.0),
-    "arena/radio/lost": EntityStyle(rr.Arrows2D, palette.LOST, 1.8, 19.0),
-    "arena/radio/delivered": EntityStyle(rr.Arrows2D, palette.DELIVERED, 2.0, 20.0),
-    "arena/radio/answered": EntityStyle(rr.Arrows2D, palette.ANSWERED, 1.5, 21.0),
-    "arena/world/cut_off": EntityStyle(rr.Points2D, palette.CUT_OFF, 12.0, 24.0),
-    "arena/radio/transmitter": EntityStyle(rr.Points2D, palette.BROADCAST, 9.0, 25.0),
-    "arena/heading": EntityStyle(rr.LineStrips2D, palette.HEADING, 0.8, 29.0),
-    "arena/robots": EntityStyle(rr.Points2D, None, 5.5, 30.0),
-    "arena/ego/name": EntityStyle(rr.Points2D, palette.EGO, 0.1, 30.0),
-    "arena/ego": EntityStyle(rr.Ellipses2D, palette.EGO, 1.2, 31.0),
-    "tree/hops": EntityStyle(rr.LineStrips2D, palette.GRID, 0.5, 0.0),
-    "tree/edges": EntityStyle(rr.LineStrips2D, palette.TREE, 0.8, 1.0),
-    "tree/nodes": EntityStyle(rr.Points2D, None, 4.5, 2.0),
-    "state/now": EntityStyle(rr.LineStrips2D, palette.TEXT, 0.6, 1.0),
-    "scene/grid": EntityStyle(rr.LineStrips3D, palette.OUTLINE, 0.5),
-    "scene/heading": EntityStyle(rr.LineStrips3D, palette.HEADING, 0.8),
-    "scene/world/unbelieved": EntityStyle(rr.LineStrips3D, None, 0.6),
-    "scene/world/too_weak": EntityStyle(rr.LineStrips3D, None, 0.5),
-    **{
-        f"scene/packets/{fate}": EntityStyle(rr.LineStrips3D, style.colour, 1.0)
-        for fate, style in PACKETS.items()
-    },
-}
+def _layers() -> dict[str, EntityStyle]:
+    """Return the styles in `layers.toml`, with the colours that they name."""
+    colours = vars(palette) | {fate: style.colour for fate, style in PACKETS.items()}
+    colours["own"] = None
+    text = Path(__file__).with_name("layers.toml").read_text("utf-8")
+    return {
+        path: EntityStyle(getattr(rr, kind), colours[colour], *numbers)
+        for path, (kind, colour, *numbers) in tomllib.loads(text).items()
+    }
+
+
+LAYERS = _layers()
 
 
 class RerunLog:

@@ -4,7 +4,9 @@ From its own buffer, the packets it sent and decoded, its identity, the team's s
 """
 
 import math
+import tomllib
 from dataclasses import replace
+from pathlib import Path
 from typing import ClassVar
 
 import numpy as np
@@ -23,28 +25,8 @@ FAR_RANGES = 4.0  # distances count up to here [ranges]
 CROWD = 10.0  # neighbours that count as 1
 TEAM = 40.0  # robots that count as 1
 
-# What a node tells, by its field in `NODE`, in the network's order. A node of the robot itself
-# carries what concerns all of its neighbours.
-FEATURES = {
-    "is_oneself": "is oneself",
-    "is_known": "is known",
-    "timestamp_age": "age of T",
-    "distance": "distance",
-    "is_near": "is in range",
-    "heard_age": "age of last packet heard",  # of oneself: since it last spoke first
-    "attempt_age": "age of last attempt",
-    "addressed_age": "age of last being addressed",
-    "news": "news to it, by its last packet",  # of oneself: to all in range together
-    "unsaid_news": "news to it, if it heard what was said last",  # as above
-    "turn_rank": "rank of its turn",
-    "has_turn_1_5": "has a turn, 1.5 ranges apart",
-    "has_turn_2": "has a turn, 2 ranges apart",
-    "has_turn_3": "has a turn, 3 ranges apart",
-    "has_joined": "has a turn, by interference",
-    "neighbours": "neighbours",
-    "known_share": "share of the team known",
-    "team_size": "size of the team",
-}
+# What a node tells, by its field in `NODE`, in the network's order.
+FEATURES: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
 Places = Float[np.ndarray, "B N N 2"]

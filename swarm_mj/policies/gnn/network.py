@@ -64,15 +64,10 @@ class Perceptrons(nn.Module):
 
 
 class Core(Perceptrons):
-    """The non-linear updates, NN_e and NN_v (Eq. 13)."""
+    """The non-linear updates, NN_e and NN_v (Eq. 13).
 
-    def update_edge(self, edge: Tensor, receiver: Tensor, sender: Tensor) -> Tensor:
-        """NN_e([e, v_r, v_s]), one row per edge."""
-        return self.edge(torch.cat([edge, receiver, sender], dim=1))
-
-    def update_node(self, mean: Tensor, node: Tensor) -> Tensor:
-        """NN_v([mean of e', v]), one row per node."""
-        return self.node(torch.cat([mean, node], dim=1))
+    They are of [e, v_r, v_s], one row per edge, and of [mean of e', v], one row per node.
+    """
 
 
 def mean_aggregation(edge: EdgeRows, receiver: Int[Tensor, "e"], num_nodes: int) -> NodeRows:
@@ -90,9 +85,9 @@ def gn_block(
     Without a core, in the linear variant, edges copy their senders, so that GN(v) = A v.
     """
     sender = node[edges.sender]
-    edge = core.update_edge(edge, node[edges.receiver], sender) if core else sender
+    edge = core.edge(torch.cat([edge, node[edges.receiver], sender], dim=1)) if core else sender
     mean = mean_aggregation(edge, edges.receiver, len(node))
-    return core.update_node(mean, node) if core else mean, edge
+    return core.node(torch.cat([mean, node], dim=1)) if core else mean, edge
 
 
 class AggregationGnn(nn.Module):

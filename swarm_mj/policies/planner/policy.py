@@ -62,10 +62,6 @@ class Planner(BroadcastPolicy):
         """Return those of the snapshots; arguments as in `Policy.payload_fields`."""
         return snapshot_fields(mission)
 
-    def inform(self, belief: Belief) -> None:
-        """Plan by this belief from now on."""
-        self._belief = belief
-
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw each mission's orders of turns and forget; arguments as in `Policy.start`."""
         self.teams = [

@@ -83,7 +83,7 @@ class RestingPlanner(BroadcastPolicy):
 
     def inform(self, belief: Belief) -> None:
         """Plan by this belief from now on, also in the turns."""
-        self._belief = belief
+        super().inform(belief)
         self._turns.inform(belief)
         if self._moving is not None:
             self._moving.inform(belief)

@@ -55,7 +55,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""
-        self._belief = belief
+        super().inform(belief)
         self._turns.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
