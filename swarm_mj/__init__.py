@@ -66,6 +66,7 @@ if TYPE_CHECKING:
         Policy,
         make_policy,
     )
+    from swarm_mj.simulation.link import Link
     from swarm_mj.simulation.rollout import summarise
     from swarm_mj.simulation.swarm import Swarm
 
@@ -77,6 +78,7 @@ __all__ = [
     "CentralisedPolicy",
     "DecentralisedPolicy",
     "Evaluation",
+    "Link",
     "LocalViews",
     "Mission",
     "Policy",
@@ -100,6 +102,7 @@ _HOMES = {
         *("POLICIES", "BroadcastPolicy", "CentralisedPolicy", "DecentralisedPolicy"),
         *("LocalViews", "Policy", "make_policy"),
     ),
+    "simulation.link": ("Link",),
     "simulation.rollout": ("summarise",),
     "simulation.swarm": ("Swarm",),
 }
