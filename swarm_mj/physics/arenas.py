@@ -6,6 +6,7 @@ with 0, that of its material's name (`LOSS_DB`), or `DEFAULT_LOSS_DB`.
 """
 
 import os
+import tomllib
 from collections.abc import Callable, Iterator
 from itertools import product
 from pathlib import Path
@@ -39,15 +40,8 @@ MAX_REPLICAS = 10_000  # of a <replicate>; more would be compiled for minutes
 NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
 TREES_PER_KM2 = 100.0
 TREE_RADIUS_M = 6.0
-COLOURS = {
-    "building": [0.36, 0.40, 0.47, 1.0],
-    "light wall": [0.45, 0.50, 0.58, 1.0],
-    "tree": [0.20, 0.38, 0.30, 1.0],
-}
-# Per obstacle crossed. Walls: COST 231 (1999), section 4.7, at 1.8 GHz. A building counts as two
-# outer walls of 7 dB and the rooms between them; a tree as 12 m of leaves at about 0.5 dB/m (ITU-R
-# P.833).
-LOSS_DB = {"light wall": 3.4, "heavy wall": 6.9, "building": 25.0, "tree": 6.0}
+_MATERIALS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+LOSS_DB: dict[str, float] = _MATERIALS["loss_db"]
 DEFAULT_LOSS_DB = 10.0
 
 
@@ -193,7 +187,7 @@ def _add(
     spec: MjSpec, material: str, shape: str, centre_m: tuple[float, ...], size_m: tuple[float, ...]
 ) -> None:
     if spec.material(material) is None:
-        spec.add_material(name=material, rgba=COLOURS[material])
+        spec.add_material(name=material, rgba=_MATERIALS["rgba"][material])
     spec.worldbody.add_geom(
         type=getattr(mjtGeom, f"mjGEOM_{shape.upper()}"),
         pos=[*centre_m, HALF_HEIGHT_M],

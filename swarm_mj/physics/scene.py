@@ -2,7 +2,9 @@
 
 import copy
 import math
+import tomllib
 from collections.abc import Callable
+from pathlib import Path
 from xml.etree import ElementTree
 
 import numpy as np
@@ -28,15 +30,7 @@ ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 # What a scene must leave: of joints, of actuators, and of MuJoCo's options.
-MOVING = (
-    *("axis", "damping", "stiffness", "frictionloss", "armature", "range", "limited", "ref"),
-    *("springref", "actfrclimited", "solref_limit", "solimp_limit", "actgravcomp", "margin"),
-    *("gear", "gainprm", "biasprm", "gaintype", "biastype", "dyntype", "dynprm"),
-    *("ctrlrange", "forcerange", "ctrllimited", "forcelimited"),
-    *("integrator", "solver", "cone", "jacobian", "enableflags", "disableactuator"),
-    *("iterations", "tolerance", "ls_iterations", "ls_tolerance", "impratio"),
-    *("gravity", "wind", "density", "viscosity"),
-)
+MOVING = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["moving"]
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 

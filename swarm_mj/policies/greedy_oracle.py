@@ -40,15 +40,9 @@ class GreedyOracle(CentralisedPolicy):
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the window's schedule; robots move before they talk, which it does not foresee."""
         timestamp = (SLOTS_PER_WINDOW * views.buffers.timestamp).astype(np.float32)
-        windows = [
-            greedy_window(
-                timestamp[b],
-                SLOTS_PER_WINDOW * float(views.now[b]),
-                self._truth.links(states.position_m[b], b),
-            )
-            for b in range(len(timestamp))
-        ]
-        return np.stack(windows)
+        now = (SLOTS_PER_WINDOW * views.now).tolist()
+        links = [self._truth.links(at_m, b) for b, at_m in enumerate(states.position_m)]
+        return np.stack(list(map(greedy_window, timestamp, now, links)))
 
 
 @compiled()

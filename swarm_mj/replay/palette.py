@@ -18,11 +18,7 @@ GRID: Colour = (30, 36, 46)
 WALL: Colour = (112, 122, 138)
 OUTLINE: Colour = (44, 52, 66)
 RANGE: Colour = (44, 55, 74)
-OBSTACLE: Colour = (34, 40, 51)
 TEXT: Colour = (255, 255, 255)
-TRAIL: Colour = (50, 60, 76)
-BELIEF: Colour = (104, 118, 144)
-TREE: Colour = (78, 90, 112)
 EGO: Colour = (255, 255, 255)
 UNKNOWN: Colour = (84, 86, 94)
 SWITCHED_OFF: Colour = (46, 48, 54)
@@ -50,10 +46,6 @@ FILM_CURVES: tuple[Colour, Colour] = ((255, 255, 255), (255, 120, 190))
 def dim(colour: Colour, share: float) -> Colour:
     """Return a darker shade: alpha on 2D lines only darkens, so darken plainly."""
     return (int(colour[0] * share), int(colour[1] * share), int(colour[2] * share))
-
-
-BELIEF_ERROR: Colour = dim(BELIEF, 0.8)
-LOST_REST: Colour = dim(LOST, 0.5)  # of the way that a lost packet did not come
 
 
 class PacketStyle(NamedTuple):

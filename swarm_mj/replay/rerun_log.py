@@ -39,12 +39,12 @@ class EntityStyle(NamedTuple):
 
 def _layers() -> dict[str, EntityStyle]:
     """Return the styles in `layers.toml`, with the colours that they name."""
-    colours = vars(palette) | {fate: style.colour for fate, style in PACKETS.items()}
-    colours["own"] = None
-    text = Path(__file__).with_name("layers.toml").read_text("utf-8")
+    said = tomllib.loads(Path(__file__).with_name("layers.toml").read_text("utf-8"))
+    fates = {fate: style.colour for fate, style in PACKETS.items()}
+    colours = vars(palette) | said["colours"] | fates | {"own": None}
     return {
         path: EntityStyle(getattr(rr, kind), colours[colour], *numbers)
-        for path, (kind, colour, *numbers) in tomllib.loads(text).items()
+        for path, (kind, colour, *numbers) in said["layers"].items()
     }
 
 

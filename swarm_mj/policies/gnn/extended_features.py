@@ -68,14 +68,8 @@ class ExtendedFeatures(FeatureExtractor):
             may_address=may_address,
         )
         _write_beliefs(buffers.position_m, is_known, window, range_m, node)
-        write_joined(
-            believed_m=buffers.position_m,
-            is_known=is_known,
-            turn=window,
-            range_m=range_m,
-            threshold=from_db(self._mission.sinr_threshold_db),
-            has_joined=node["has_joined"],
-        )
+        threshold, has_joined = from_db(self._mission.sinr_threshold_db), node["has_joined"]
+        write_joined(buffers.position_m, is_known, window, range_m, threshold, has_joined)
         rows = (len(window) * num_robots, num_robots)
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(FEATURES)),
