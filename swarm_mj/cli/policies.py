@@ -14,7 +14,7 @@ from rich.table import Column, Table
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy
+from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, uses_of
 from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, setting
@@ -75,7 +75,7 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
         "name": name,
         "is_centralised": policy.is_centralised,
         "window": "broadcasts" if policy.window(mission).is_broadcast else "request",
-        "uses": policy.uses,
+        "uses": uses_of(name, policy),
         "payload": policy.payload,
         "packet_bytes": packet.num_bytes,
         "packet_fields": [

@@ -76,8 +76,6 @@ class CarrierSense(RandomTransmission, SensingPolicy):
     each minislot a robot whose channel is idle begins with probability p.
     """
 
-    uses = "the power that it senses in the channel before it transmits"
-
     def __init__(self, probability: float, sensing_dbm: float) -> None:
         """Take the probability in each minislot, and the power from which a channel is busy."""
         RandomTransmission.__init__(self, probability)
@@ -99,11 +97,6 @@ class AgeGainCsma(SensingPolicy):
     learned the same. The power that counts as busy changes from slot to slot: where it is low,
     fewer robots transmit, so that packets get through weaker links.
     """
-
-    uses = (
-        "the power that it senses before it transmits, T, the clock, and the places of those it "
-        "hears"
-    )
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio."""

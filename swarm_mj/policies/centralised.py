@@ -20,8 +20,6 @@ class RoundRobin(CentralisedPolicy):
     window.
     """
 
-    uses = "the true positions: a base near the middle talks to each robot in turn"
-
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the base, for the one robot whose turn it is."""
         recipient = views.silence.copy()
@@ -51,8 +49,6 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
 
     Each exchanges buffers with it with probability p.
     """
-
-    uses = "the true positions at the start: a robot talks to its parent in their spanning tree"
 
     def __init__(
         self, probability: float, *, is_recomputed: bool = False, root_transmits: bool = False

@@ -31,8 +31,6 @@ class GreedyOracle(CentralisedPolicy):
     where the authors' code would let that robot hear.
     """
 
-    uses = "all buffers, all true positions and the true channel except its fades, at every moment"
-
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
         self._truth = TrueLinks(radio=radio_of(mission))

@@ -21,7 +21,7 @@ class Policy:
     """A choice of the robot that every robot addresses next, and of the form of a window."""
 
     is_centralised: bool = False  # whether a centre decides, or each robot by itself
-    uses: str = ""  # the information that each robot decides by, or the centre, in a few words
+    uses: str = ""  # the information that it decides by, in a few words; ours: `uses.toml`
     payload: str = "none"  # what packets carry beyond T, M and P (II-B), in a word
 
     def window(self, mission: Mission) -> WindowProtocol:

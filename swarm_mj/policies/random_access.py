@@ -45,8 +45,6 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
     only under their half-duplex rule, by which an addressed robot hears while it sends.
     """
 
-    uses = "nothing: it transmits with probability p"
-
     def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
         """Take the probability of a draw in each slot, and whether packets name an addressee."""
         super().__init__(probability)
@@ -85,8 +83,6 @@ class Aloha(RandomTransmission, BroadcastPolicy):
     stations, and `probability` is that any of them broadcasts in a slot: each does so with
     1 - (1 - p)^(1/n).
     """
-
-    uses = "how many neighbours its buffer shows"
 
     def __init__(self, probability: float, *, range_m: float) -> None:
         """Take the probability and the distance at which a lone transmission just decodes [m]."""
@@ -133,8 +129,6 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     position now and then. Two unanswered broadcasts a window lead to a lower age than one packet
     that a neighbour answers.
     """
-
-    uses = "how much it has learned since its last transmission"
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Give every robot its own numbers, and everything to tell; as `Policy.start`."""

@@ -5,6 +5,7 @@ user's own. `gnn` is the learned policy that comes with the package.
 """
 
 import os
+import tomllib
 from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import Any
@@ -72,6 +73,7 @@ PAIR_BYTES = {
     "greedy-oracle": (0.0, 60.0, 0.0),
 }
 SHIPPED = "gnn"  # in assets/policies/
+USES = tomllib.loads(Path(__file__).with_name("uses.toml").read_text("utf-8"))
 POLICIES = (*RULES, SHIPPED)
 
 
@@ -145,6 +147,12 @@ def is_stored(name: str) -> bool:
     is_path = any(separator in name for separator in (os.sep, os.altsep) if separator)
     is_there = os.path.isdir(name) or os.path.isfile(f"{name}{SUFFIX}")
     return name not in POLICIES and (is_path or name.endswith(SUFFIX) or is_there)
+
+
+def uses_of(name: str, policy: Policy) -> str:
+    """Return the information that a policy by this name decides by, if known, in a few words."""
+    payload = "" if policy.payload == "none" else f", {policy.payload}"
+    return policy.uses or USES.get(name.partition(" ")[0] + payload, "")
 
 
 def is_learned(name: str) -> bool:

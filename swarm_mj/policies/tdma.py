@@ -35,8 +35,6 @@ class Tdma(BroadcastPolicy):
     mission and, like the identities, granted to all of its robots beforehand (II-C).
     """
 
-    uses = "its identity, a common random order and the clock: one robot transmits per slot"
-
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
@@ -57,11 +55,6 @@ class SpatialTdma(Tdma):
     Large teams' rounds are too long for that: there such robots also send where they win by node
     activation. There is one difference: common random numbers are weighted by a robot's news.
     """
-
-    uses = (
-        "as tdma, and the positions in its buffer, T and whom it hears: robots far apart "
-        "share a slot; in large teams, those nearby with most news"
-    )
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""

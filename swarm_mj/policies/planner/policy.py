@@ -41,10 +41,6 @@ from swarm_mj.radio.mission_radio import Belief, radio_of
 class Planner(BroadcastPolicy):
     """All robots make one plan, from shared snapshots."""
 
-    uses = (
-        "its buffer, the clock, common orders, the area, its prior knowledge of the radio; and "
-        "snapshots of the team in packets"
-    )
     payload = "snapshots"  # two, taken earlier
 
     def __init__(self, mission: Mission, settings: PlannerSettings | None = None) -> None:

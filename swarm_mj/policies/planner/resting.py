@@ -69,13 +69,6 @@ class RestingPlanner(BroadcastPolicy):
         is_ready = learns and fits(packet_of(mission, snapshot_fields(mission)), mission)
         self._moving = Planner(mission) if is_ready else None
         self.payload = "links" if learns else "none"  # what robots observed of links, or nothing
-        self.uses = (
-            "its buffer, the clock, a common order, its prior knowledge of the radio; and all "
-            "robots' observations of their links, in packets"
-            if learns
-            else "as planner, without a payload: stationary robots agree from their buffers alone; "
-            "moving teams fly spatial-tdma"
-        )
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
         """Return those of observed links; arguments as in `Policy.payload_fields`."""

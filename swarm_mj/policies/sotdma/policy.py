@@ -39,12 +39,6 @@ class SelfOrganisedTdma(BroadcastPolicy):
     Of what the mission grants of the channel it uses the mean powers.
     """
 
-    uses = (
-        "its buffer, T and P in packets, a common random order, the clock and the radio: robots "
-        "own slots, announced implicitly by transmitting, and choose the slot that keeps the "
-        "information freshest"
-    )
-
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
         self._turns, self._belief = SpatialTdma(mission), Belief(radio=radio_of(mission))
