@@ -115,7 +115,7 @@ class Work:
         """True if the results of this very experiment are there."""
         if not all(path.exists() for path in self.tables):
             return False
-        _, rows = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
+        rows = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
         return {row.get("experiment") for _, row in rows} == {self.digest}
 
     @cached_property
@@ -270,7 +270,7 @@ def _remove(work: Work) -> None:
 
 def _rows(path: Path) -> list[dict[str, Any]]:
     """Return a run's learning curve."""
-    _, rows = read_rows(path, "learning curve", MOST_BYTES)
+    rows = read_rows(path, "learning curve", MOST_BYTES)
     return [{name: float(cell) if cell else None for name, cell in row.items()} for _, row in rows]
 
 

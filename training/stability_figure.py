@@ -74,7 +74,7 @@ def read_curves(path: Path) -> Curves:
         ValueError: The file cannot be read, has none of a kind, or curves of a kind were not
             evaluated after the same numbers of decisions.
     """
-    _, rows = read_rows(path, "table of curves", MOST_BYTES)
+    rows = read_rows(path, "table of curves", MOST_BYTES)
     columns = ("decisions", *(panel.cost for panel in PANELS))
     found: dict[str, list[list[float]]] = defaultdict(list)
     try:
@@ -101,7 +101,7 @@ def read_origin(path: Path) -> str:
     Raises:
         ValueError: It cannot be read, or has several commits or team sizes where one is needed.
     """
-    _, rows = read_rows(path, "table of trainings", MOST_BYTES)
+    rows = read_rows(path, "table of trainings", MOST_BYTES)
     its = [row for _, row in rows if row.get("training", "").partition("-")[0] in KINDS]
     commits = {row.get("commit", "") for row in its}
     sizes = {str(read_json(row.get("settings", ""), dict).get("robots")) for row in its}

@@ -12,15 +12,8 @@ from matplotlib.figure import Figure, SubFigure
 from matplotlib.ticker import LogLocator
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.figures.style import (
-    FAINT,
-    WIDTH_IN,
-    code,
-    escape_mathtext,
-    look_of,
-    styled,
-    write_caption,
-)
+from swarm_mj.evaluation.figures import style
+from swarm_mj.evaluation.figures.style import look_of
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
 from swarm_mj.evaluation.table import missions_of
 
@@ -48,7 +41,7 @@ def draw_flight(
     """
     colour = look_of(policy).colour
     number = 2 if own_cost else 1
-    with styled():
+    with style.styled():
         figure, axes = _axes(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
         for each in axes:
             each.margins(x=0.01)
@@ -75,14 +68,15 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
         HEAD_IN + LINE_IN * (len(title) - 1) + ROW_IN * len(shown)
         for title, shown in zip(titles, groups.values(), strict=True)
     ]
-    with styled():
-        figure = plt.figure(figsize=(WIDTH_IN, sum(heights_in) + FOOT_IN), layout="constrained")
+    with style.styled():
+        size_in = style.WIDTH_IN, sum(heights_in) + FOOT_IN
+        figure = plt.figure(figsize=size_in, layout="constrained")
         parts = figure.subfigures(len(groups), 1, height_ratios=heights_in, squeeze=False)
         for part, title, shown in zip(parts.flat, titles, groups.values(), strict=True):
-            said = escape_mathtext("\n".join(title))
+            said = style.escape_mathtext("\n".join(title))
             part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
             _draw_policies(part, sorted(shown, key=lambda result: result.aoi_mean))
-        write_caption(figure, _origin(results))
+        style.write_caption(figure, _origin(results))
     return kept(figure)
 
 
@@ -93,10 +87,10 @@ def draw_learning(
 
     A line has its team decisions, its ages, and the ends of their band [windows].
     """
-    with styled():
+    with style.styled():
         figure, (axes,) = _axes("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
         for label, (decisions, ages, low, high) in lines.items():
-            (line,) = axes.plot(decisions, ages, label=escape_mathtext(label))
+            (line,) = axes.plot(decisions, ages, label=style.escape_mathtext(label))
             axes.fill_between(decisions, low, high, color=line.get_color(), alpha=0.2)
         for policy, age in levels.items():
             look = look_of(policy)
@@ -107,7 +101,7 @@ def draw_learning(
         axes.yaxis.set_minor_formatter("")
         axes.xaxis.set_major_formatter("{x:,.0f}")
         axes.legend(frameon=False)
-        write_caption(figure, origin)
+        style.write_caption(figure, origin)
     return kept(figure)
 
 
@@ -133,12 +127,13 @@ def _origin(results: Sequence[Result]) -> str:
         said += ", and its 95 % interval"
     if any(map(carries_more, results)):
         said += f"; +: packets {CARRIES_MORE}"
-    return f"{said}; {code(first.version, first.commit)}"
+    return f"{said}; {style.code(first.version, first.commit)}"
 
 
 def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     if "aoi_worst" in columns:
-        axes.plot(columns["window"], columns["aoi_worst"], color=FAINT, lw=0.8, label="worst pair")
+        look = {"color": style.FAINT, "lw": 0.8, "label": "worst pair"}
+        axes.plot(columns["window"], columns["aoi_worst"], **look)
     axes.plot(columns["window"], columns["aoi"], color=colour, label="mean over all pairs")
     axes.set_ylabel(LABELS["aoi"])
     axes.set_ylim(bottom=0.0)
@@ -161,9 +156,9 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
 
 def _axes(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes]]:
     """Return a titled figure of panels below each other, over one x."""
-    figure = plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    figure = plt.figure(figsize=(style.WIDTH_IN, height_in), layout="constrained")
     axes = figure.subplots(rows, 1, sharex="col", squeeze=False)
-    figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
+    figure.suptitle(style.escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
     return figure, list(axes.flat)
 
 

@@ -15,10 +15,7 @@ from matplotlib.patches import Polygon, Rectangle
 from swarm_mj.api.charts import kept
 from swarm_mj.evaluation.figures.style import CAPTION, escape_mathtext, styled
 from swarm_mj.mission.presets import where_flown
-from swarm_mj.physics.arenas import obstacles_of
-from swarm_mj.physics.outlines import footprints
-from swarm_mj.physics.scene import compose
-from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.physics import arenas, outlines, scene, state
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
 from swarm_mj.system.packages import version
@@ -39,8 +36,7 @@ POINTS_PER_IN = 72.0
 def draw_picture(footage: Footage, window: int | None = None) -> Figure:
     """Return a map of one window, 16 by 9; the last unless given, 1 is a mission's first.
 
-    Raises:
-        ValueError: There is no such window.
+    Raises ValueError if there is no such window.
     """
     row = _row(footage, window)
     with styled():
@@ -106,10 +102,11 @@ def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     line["color"] = _rgb(palette.WALL)
     axes.add_patch(Rectangle((low_m, low_m), side_m, side_m, fill=False, zorder=1.0, **line))
     shown = [Line2D([], [], label="wall of the area" if mission.has_walls else "area", **line)]
-    obstacles = obstacles_of(compose(mission, scene=footage.scene).compile())
+    model = scene.compose(mission, scene=footage.scene).compile()
+    obstacles = arenas.obstacles_of(model)
     if len(obstacles.kind) > 0:
         inside, edge = _rgb(palette.OUTLINE), _rgb(palette.WALL)
-        for outline_m in footprints(obstacles, ROBOT_HEIGHT_M):
+        for outline_m in outlines.footprints(obstacles, state.ROBOT_HEIGHT_M):
             block = Polygon(outline_m, facecolor=inside, edgecolor=edge, linewidth=0.8, zorder=1.5)
             axes.add_patch(block)
         shown.append(_dot("obstacle", palette.OUTLINE, "s", palette.WALL))

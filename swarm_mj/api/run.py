@@ -19,15 +19,10 @@ from swarm_mj.protocol.costs import PACKET_COUNTS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.rollout import WindowRecord
+from swarm_mj.system import terminal
 from swarm_mj.system.fields import as_typed, did_you_mean
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import (
-    WorkBar,
-    is_notebook,
-    named_values,
-    plain_console,
-    quiet_console,
-)
+from swarm_mj.system.terminal import is_notebook
 from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv, write_json
 
 if TYPE_CHECKING:  # each is slow to import, and flights do without
@@ -105,7 +100,7 @@ class Run:
 
     def table(self) -> Table:
         """Return the numbers as a table, for terminals."""
-        return named_values(self.title, self._rows, caption=AGE)
+        return terminal.named_values(self.title, self._rows, caption=AGE)
 
     @property
     def _rows(self) -> dict[str, str]:
@@ -164,10 +159,8 @@ class Run:
     def picture(self, window: int | None = None) -> "Figure":
         """Draw a map of one window, for a slide: robots by age, trails, packets, obstacles.
 
-        It is the last window unless given; 1 is the first. Colours are those of the replay.
-
-        Raises:
-            ValueError: There is no such window, or nothing was recorded.
+        It is the last window unless given; 1 is the first. Colours are those of the replay. Raises
+        ValueError if there is no such window, or nothing was recorded.
         """
         footage = self.footage()
         need("matplotlib", "a picture")
@@ -178,12 +171,11 @@ class Run:
     def show(self) -> None:
         """Play the flight as a video, in a notebook; elsewhere, say how to see it.
 
-        Raises:
-            ValueError: Nothing was recorded that a video shows.
-            OSError: No OpenGL works here; it says what to install.
+        Raises ValueError if nothing was recorded that a video shows, and OSError if no OpenGL works
+        here; it says what to install.
         """
         if not is_notebook():
-            plain_console().print(ELSEWHERE)
+            terminal.plain_console().print(ELSEWHERE)
             return
         content = self._film(".mp4")
         from IPython.display import Video, display
@@ -194,8 +186,7 @@ class Run:
     def footage(self) -> Log:
         """Return the pictures' data; `rendering.video.make_video` puts two side by side.
 
-        Raises:
-            ValueError: Nothing was recorded.
+        Raises ValueError if nothing was recorded.
         """
         if self.log is None:
             raise ValueError("nothing was recorded that could be shown; fly with record=True")
@@ -210,11 +201,9 @@ class Run:
         """Write the flight, replacing the file if it exists; return the path.
 
         By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the summary as
-        `swarm-mj fly --json` writes it (.json), or one row per window (.csv).
-
-        Raises:
-            ValueError: The name has another ending, or nothing was recorded that it would show.
-            OSError: The file cannot be written, or no OpenGL works here.
+        `swarm-mj fly --json` writes it (.json), or one row per window (.csv). Raises ValueError if
+        the name has another ending, or nothing was recorded that it would show; OSError if the file
+        cannot be written, or no OpenGL works here.
         """
         path = Path(path)
         check_outputs(Output("the file", path, ".rrd|.mp4|.gif|.json|.csv"))
@@ -231,7 +220,9 @@ class Run:
             case ".csv":
                 columns = self.columns()
                 rows = np.column_stack(list(columns.values())).tolist()
-                cells = (dict(zip(columns, map(_cell, row), strict=True)) for row in rows)
+                # None, an empty cell, is what is not defined.
+                shown = ([None if math.isnan(x) else as_typed(x) for x in row] for row in rows)
+                cells = (dict(zip(columns, row, strict=True)) for row in shown)
                 write_csv(path, list(columns), cells)
             case ending:
                 write_bytes(path, self._film(ending))
@@ -245,9 +236,6 @@ class Run:
         from swarm_mj.replay.rendering.video import make_video
 
         style = fitted(replace(DEFAULTS[ending], seconds=default_seconds([footage])), ending)
-        with WorkBar("Drawing", style.num_frames, "pictures", console=quiet_console()) as bar:
+        console = terminal.quiet_console()
+        with terminal.WorkBar("Drawing", style.num_frames, "pictures", console=console) as bar:
             return make_video([footage], ending, style, bar.advance)
-
-
-def _cell(value: float) -> str | None:
-    return None if math.isnan(value) else as_typed(value)

@@ -44,9 +44,8 @@ BEGINNING = {
 def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
     """Return the function to run for the arguments after `swarm-mj`, and its options.
 
-    Raises:
-        ValueError: A value is unknown or outside its range.
-        SystemExit: The line cannot be read, or only help was asked for.
+    Raises ValueError if a value is unknown or outside its range, and SystemExit if the line cannot
+    be read, or only help was asked for.
     """
     if not arguments or arguments[0] not in COMMANDS:
         _show_or_refuse(arguments)

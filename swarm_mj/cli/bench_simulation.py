@@ -239,7 +239,6 @@ def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], obj
     """
 
     def talk() -> None:
-        """Play the radio's part of the next window."""
         window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
         swarm.now = swarm.now + 1.0
 

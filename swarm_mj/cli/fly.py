@@ -13,7 +13,7 @@ from rich.console import Console
 
 from swarm_mj.api.fly import flight_needs, fly_mission
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
-from swarm_mj.cli.options import output_option
+from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies import registry
@@ -21,7 +21,7 @@ from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.replay.view import has_display, view_command
 from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import setting
+from swarm_mj.system.fields import common_setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import is_installed, missing, need
@@ -41,26 +41,20 @@ class FlyOptions(PolicyOptions):
         "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (what was flown is "
         "recorded)."
     )
-    policy: str = setting(
-        "planner",
-        f"{NAMES}, a directory with a learned policy, or module:Name of your own",
-        is_common=True,
+    policy: str = common_setting(
+        "planner", f"{NAMES}, a directory with a learned policy, or module:Name of your own"
     )
-    seed: int = setting(1, "the same seed is the same mission", is_common=True)
+    seed: int = common_setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
-    record: Path | None = output_option(
-        None,
-        "the replay",
-        metavar="FILE.rrd",
-        shown=f"a fresh name under {REPLAYS}/",
-        is_common=True,
+    record: Path | None = common_output(
+        None, "the replay", metavar="FILE.rrd", shown=f"a fresh name under {REPLAYS}/"
     )
-    no_record: bool = output_option(False, "record no replay", is_common=True)
-    json: Path | None = output_option(None, "write a summary", is_common=True)
+    no_record: bool = common_output(False, "record no replay")
+    json: Path | None = common_output(None, "write a summary")
     force: bool = output_option(False, "replace existing files")
     yes: bool = output_option(False, YES)
     observer: int = output_option(0, "the robot whose knowledge the replay shows")
-    view: bool = output_option(False, "open the replay afterwards", is_common=True)
+    view: bool = common_output(False, "open the replay afterwards")
 
 
 def run(options: FlyOptions) -> int:

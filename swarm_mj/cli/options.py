@@ -14,21 +14,13 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn, get_origin
 
+from swarm_mj.system import fields as settings
 from swarm_mj.system.exit_codes import BAD_INPUT
-from swarm_mj.system.fields import (
-    FORMER_NAMES,
-    FieldOf,
-    as_typed,
-    check,
-    did_you_mean,
-    kind_of,
-    range_of,
-    setting,
-)
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
-output_option = partial(setting, group="output")  # under this heading of the help
+output_option = partial(settings.setting, group="output")  # under this heading of the help
+common_output = partial(output_option, is_common=True)
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
 
@@ -57,7 +49,7 @@ class Parser(argparse.ArgumentParser):
         parsed, left = self.parse_known_args(arguments)
         if left:
             flags = [flag for action in self._actions for flag in action.option_strings]
-            hint = did_you_mean(left[0].partition("=")[0], flags)
+            hint = settings.did_you_mean(left[0].partition("=")[0], flags)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
 
@@ -66,9 +58,8 @@ class Parser(argparse.ArgumentParser):
         self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
 
 
-class _HelpAll(argparse.Action):
+class _HelpAll(argparse.Action):  # with the options that most people do not need
     def __call__(self, parser: argparse.ArgumentParser, *_: object) -> NoReturn:
-        """Print the help with the options that most people do not need; exit."""
         assert isinstance(parser, Parser)
         for action, text in parser.rare.items():
             action.help = text
@@ -94,7 +85,7 @@ class _Formatter(argparse.HelpFormatter):
 
 def nested(
     options: Callable[[], Iterable[Field[Any]]], build: Callable[[dict[str, Any]], Any]
-) -> FieldOf:
+) -> settings.FieldOf:
     """Return a field that several options fill; `build` makes its value of all values given."""
     return field(metadata={"options": options, "build": build})
 
@@ -114,10 +105,8 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
     """Return the command line as an instance of its dataclass, `kind`.
 
     Its `EPILOG`, if it has one, ends the help; a field `typed` takes the arguments themselves.
-
-    Raises:
-        ValueError: A value is not among the choices, or out of range, or no name of a file.
-        SystemExit: The options cannot be read, or help was asked for.
+    Raises ValueError if a value is not among the choices, or out of range, or no name of a file;
+    SystemExit if the options cannot be read, or help was asked for.
     """
     _check_names(arguments)
     parsed = vars(_parser_of(kind, prog, summary).known(arguments))
@@ -127,14 +116,14 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
     values = {spec.name: given[spec.name] for spec in specs if spec.name in given}
     built = (spec for spec in specs if "build" in spec.metadata)
     options = kind(**values, **{spec.name: spec.metadata["build"](given) for spec in built})
-    check(options)
+    settings.check(options)
     return options
 
 
 def flags_of(spec: Field[Any]) -> tuple[str, ...]:
     """Return the flag of a field, `--windows` of `num_windows`, then those of earlier releases."""
     name = spec.name.removeprefix("num_").removeprefix("is_")
-    former = (old for old, present in FORMER_NAMES.items() if present == spec.name)
+    former = (old for old, present in settings.FORMER_NAMES.items() if present == spec.name)
     flags = ["--" + each.replace("_", "-") for each in (name, *former)]
     return (spec.metadata.get("flag", flags[0]), *flags[1:])
 
@@ -211,7 +200,7 @@ def _is_required(spec: Field[Any]) -> bool:
 
 
 def _add(group: argparse._ActionsContainer, spec: Field[Any]) -> None:
-    kind, about = kind_of(spec), spec.metadata
+    kind, about = settings.kind_of(spec), spec.metadata
     place = _place(spec)
     how: dict[str, Any] = {"help": _help(spec)}
     if kind is bool:
@@ -236,14 +225,14 @@ def _help(spec: Field[Any]) -> str:
         text += f": {', '.join(about['choices'])}"
     if "low" in about:
         has_end = about["high"] < MANY
-        text += f", {range_of(spec)}" if has_end else f", {about['low']} or more"
+        text += f", {settings.range_of(spec)}" if has_end else f", {about['low']} or more"
     has_default = not any(spec.default is each for each in (MISSING, None, False, ()))
-    default = about.get("shown", as_typed(spec.default) if has_default else "")
+    default = about.get("shown", settings.as_typed(spec.default) if has_default else "")
     return (text + (f" (default: {default})" if default else "")).replace("%", "%%")
 
 
 def _metavar(spec: Field[Any]) -> str:
-    return spec.metadata.get("metavar") or METAVARS.get(kind_of(spec), "VALUE")
+    return spec.metadata.get("metavar") or METAVARS.get(settings.kind_of(spec), "VALUE")
 
 
 def _path(text: str) -> Path:

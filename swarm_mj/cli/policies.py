@@ -17,7 +17,7 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, uses_of
 from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import as_typed, setting
+from swarm_mj.system.fields import as_typed, common_setting, setting
 from swarm_mj.system.packages import is_installed, missing
 from swarm_mj.system.terminal import named_values, plain_console, this_command
 
@@ -44,7 +44,7 @@ class PoliciesOptions:
         is_positional=True,
         metavar="NAME",
     )
-    json: bool = setting(False, "print JSON in place of the table", is_common=True)
+    json: bool = common_setting(False, "print JSON in place of the table")
     mission: Mission = one_mission()
 
 

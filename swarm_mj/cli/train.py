@@ -17,7 +17,7 @@ from swarm_mj.learning.selection import Progress
 from swarm_mj.learning.settings import Device, Training
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
-from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.fields import common_setting, same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
@@ -35,7 +35,7 @@ class TrainOptions:
         "130 interrupted (--resume goes on)."
     )
     out: Path = setting(help="the run's folder", metavar="runs/NAME")
-    resume: bool = setting(False, "go on with the run in OUT", is_common=True)
+    resume: bool = common_setting(False, "go on with the run in OUT")
     budget: int | None = same_as(Limits, "decisions")
     minutes: float | None = same_as(Limits, "minutes")
     patience: int | None = same_as(Limits, "patience")
@@ -47,9 +47,7 @@ class TrainOptions:
         choices=get_args(Device),
         shown="auto, --resume: as before",
     )
-    init: Path | None = setting(
-        None, "begin with a stored policy", metavar="POLICY", is_common=True
-    )
+    init: Path | None = common_setting(None, "begin with a stored policy", metavar="POLICY")
     yes: bool = setting(False, YES)
     settings: dict[str, Any] = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()

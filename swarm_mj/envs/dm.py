@@ -49,7 +49,6 @@ class SwarmPhysics(mujoco.Physics):
     """
 
     def __init__(self, swarm: Swarm, seed: int) -> None:
-        """Compile the scene of a swarm and start a mission with this seed."""
         model = compose(swarm.mission, scene=swarm.scene).compile()
         super().__init__(wrapper.MjData(wrapper.MjModel(model)))
         self.swarm = swarm

@@ -120,9 +120,8 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
         """Fly one window; `action[i]` is the recipient of robot i, itself for silence.
 
-        Raises:
-            ValueError: The action is not one integer from 0 to N - 1 per robot, or the mission is
-                over.
+        Raises ValueError if the action is not one integer from 0 to N - 1 per robot, or the mission
+        is over.
         """
         reward = self.batch.step(np.asarray(action)[np.newaxis])
         observation, info = self._seen()

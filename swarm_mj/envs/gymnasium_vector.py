@@ -72,12 +72,9 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Begin missions, all or those of `options["reset_mask"]` [B].
 
         The seed is one for each environment; or the first one's, which the others count on from; or
-        None, for missions drawn from the last seeds given.
-
-        Raises:
-            ValueError: Not one seed or one bool per environment, or no connected team could be
-                drawn.
-            TypeError: There is no such option.
+        None, for missions drawn from the last seeds given. Raises ValueError unless there is one
+        seed and one bool per environment, or if no connected team could be drawn; TypeError if
+        there is no such option.
         """
         check_names("reset", options or {}, ("reset_mask",))
         super().reset(seed=seed if isinstance(seed, int) else None)
@@ -103,9 +100,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
         """Fly one window of every mission; `actions[b, i]` is that of robot i.
 
-        Raises:
-            ValueError: A recipient is no robot, there is not one per robot, or a mission is over
-                and nothing begins it anew.
+        Raises ValueError if a recipient is no robot, there is not one per robot, or a mission is
+        over and nothing begins it anew.
         """
         actions = np.asarray(actions)
         self._check_step(actions)

@@ -87,11 +87,9 @@ class MissionBatch:
     def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
         """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
 
-        Return the reward of each robot; all of a team alike, unless the reward is credit.
-
-        Raises:
-            ValueError: No mission has begun, they are over, or a recipient is no robot; nothing has
-                moved.
+        Return the reward of each robot; all of a team alike, unless the reward is credit. Raises
+        ValueError if no mission has begun, they are over, or a recipient is no robot; then nothing
+        has moved.
         """
         if self.reward != "credit":
             self.fly(recipient)

@@ -10,8 +10,7 @@ from pettingzoo import ParallelEnv
 
 from swarm_mj.envs.gymnasium import MODES, Screen, modes_here, rendering
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
-from swarm_mj.envs.options import make_batch, robot_spaces
-from swarm_mj.envs.truth import truth, truth_space
+from swarm_mj.envs.options import make_batch, robot_spaces, truth, truth_space
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.checks import check_robots
 
@@ -74,10 +73,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Fly one window, in which each agent addresses a robot.
 
         An agent without an action is silent, and so is one that has dropped out whatever it does.
-        Everyone's info has the team's costs. All is empty once no agent is left.
-
-        Raises:
-            ValueError: There is no such agent, or an action is no robot; nothing has moved.
+        Everyone's info has the team's costs. All is empty once no agent is left. Raises ValueError
+        if there is no such agent, or an action is no robot; then nothing has moved.
         """
         [chosen] = self.batch.flown.views.silence.tolist()
         for agent, action in actions.items():

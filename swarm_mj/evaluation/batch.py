@@ -61,11 +61,9 @@ class BatchCosts:
 def fly_batch(batch: Batch) -> BatchCosts:
     """Fly a batch's missions from the first window to the last.
 
-    A mission's costs depend on its own seed, not on the missions beside it.
-
-    Raises:
-        ValueError: Unknown policy, one that has changed, a bad seed, no connected team could be
-            drawn, or a part of the user's own raised.
+    A mission's costs depend on its own seed, not on the missions beside it. Raises ValueError for
+    an unknown policy, one that has changed, or a bad seed; and if no connected team could be drawn,
+    or a part of the user's own raised.
     """
     swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
     policy = make_policy(batch.policy, batch.mission, **batch.how)

@@ -54,7 +54,7 @@ class Point:
 @cache
 def points() -> tuple[Point, ...]:
     """Return all points of all curves, in the order of the file."""
-    _, rows = read_rows(Path(__file__).with_suffix(".csv"), "table", 1_000_000)
+    rows = read_rows(Path(__file__).with_suffix(".csv"), "table", 1_000_000)
     return msgspec.convert([row for _, row in rows], tuple[Point, ...], strict=False)
 
 

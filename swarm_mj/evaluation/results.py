@@ -132,14 +132,12 @@ MAX_BYTES = 100_000_000  # of a file
 def read_results(path: Path) -> list[Result]:
     """Return the rows of a file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
 
-    Columns that no result has are ignored, and those with a default may be missing.
-
-    Raises:
-        ValueError: The file cannot be read, is no CSV, lacks columns or rows, or a cell is not of
-            its column's kind.
+    Columns that no result has are ignored, and those with a default may be missing. Raises
+    ValueError if the file cannot be read, is no CSV, lacks columns or rows, or a cell is not of its
+    column's kind.
     """
     try:
-        _, rows = read_rows(path, "results file", MAX_BYTES)
+        rows = read_rows(path, "results file", MAX_BYTES)
         if not rows:
             raise ValueError(f"results file {path} has no rows")
         return [_result(f"results file {path}, line {line}", row) for line, row in rows]

@@ -15,7 +15,7 @@ from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
 from swarm_mj.system import needs
-from swarm_mj.system.fields import check, setting
+from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.reading import read_document, read_file, read_rows
 from swarm_mj.system.writing import write_json
 
@@ -35,21 +35,19 @@ CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
 class Limits:
     """How far a run goes, and what it leaves behind; raises ValueError for what is out of range."""
 
-    decisions: int | None = setting(
+    decisions: int | None = common_setting(
         None,
         "stop after this many team decisions, earlier sessions included",
         label="budget",
         low=1,
         high=MAX_DECISIONS,
         shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
-        is_common=True,
     )
-    minutes: float | None = setting(
+    minutes: float | None = common_setting(
         None,
         "stop after this many minutes, evaluations and earlier sessions included",
         low=1e-9,
         high=1e6,
-        is_common=True,
     )
     replay_every: int | None = setting(
         None,
@@ -117,7 +115,7 @@ def read_run(folder: Path, named: Collection[str] | None = ()) -> TrainingRun:
 
 def read_curve(path: Path) -> list[Row]:
     """Return a learning curve, a row an evaluation; raise ValueError if the file holds none."""
-    _, rows = read_rows(path, "learning curve", MAX_CURVE_BYTES)
+    rows = read_rows(path, "learning curve", MAX_CURVE_BYTES)
     try:
         curve = [{name: float(cell) for name, cell in row.items() if cell} for _, row in rows]
         if not all(row["decisions"] >= 0 and row["aoi"] >= 0 for row in curve):

@@ -13,7 +13,7 @@ from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
 from swarm_mj.policies.policy_config import GnnShape, check_fit
-from swarm_mj.system.fields import check, check_value, setting
+from swarm_mj.system.fields import check, check_value, common_setting, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
@@ -72,21 +72,17 @@ class Training:
     values that are unknown, out of range, or do not go with each other.
     """
 
-    credit_assignment: CreditAssignment = setting(
+    credit_assignment: CreditAssignment = common_setting(
         "robot",
         "credit assignment, per robot (each is paid for what its own packets changed; learns "
         "in minutes) or per team (one reward for all, the paper's way)",
         label="credit",
         flag="--credit",
         choices=get_args(CreditAssignment),
-        is_common=True,
     )
     mission: Mission
-    robots: tuple[int, ...] = setting(
-        help="size of the team; several are trained on together",
-        low=2,
-        high=MAX_ROBOTS,
-        is_common=True,
+    robots: tuple[int, ...] = common_setting(
+        help="size of the team; several are trained on together", low=2, high=MAX_ROBOTS
     )
     features: str = setting(
         "extended",
@@ -97,16 +93,13 @@ class Training:
     shares_trunk: bool = True  # whether values are one more output of the same network
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
     silence_logit: float = setting(7.0, low=-100.0, high=100.0)
-    reward: Reward = setting(
-        "aoi",
-        "the cost to lower; velocity-variance needs --credit team",
-        choices=get_args(Reward),
-        is_common=True,
+    reward: Reward = common_setting(
+        "aoi", "the cost to lower; velocity-variance needs --credit team", choices=get_args(Reward)
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
-    seed: int = setting(0, "the same seed is the same policy", low=0, high=MAX_SEED, is_common=True)
+    seed: int = common_setting(0, "the same seed is the same policy", low=0, high=MAX_SEED)
     evaluate_every: int = setting(
         10_000,
         "team decisions between two evaluations",

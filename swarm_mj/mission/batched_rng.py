@@ -72,7 +72,6 @@ class Stream:
     def __init__(
         self, rngs: Sequence[np.random.Generator], draw: Draw, shape: tuple[int, ...]
     ) -> None:
-        """Prepare draws of this shape for each mission."""
         self._rngs = rngs
         self._draw = draw
         self._block = np.empty((BLOCK, len(rngs), *shape))

@@ -15,13 +15,12 @@ import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
 
 from swarm_mj.mission import Mission
-from swarm_mj.system.fields import check_callable, did_you_mean, name_of, setting
+from swarm_mj.system.fields import check_callable, did_you_mean, name_of, setting, unwrapped
 
 FORM = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 GROUP, SHOWN_AS = "your own parts, each by module:Name", "MODULE:NAME"
@@ -122,7 +121,7 @@ def load(kind: str, name: str) -> object:
         raise ValueError(f"{kind} {name}: {place} has no {attribute}{hint}")
     found = getattr(module, attribute)
     # Errors are blamed on the module named, and on that which it took the code from.
-    home = getattr(_unwrapped(found), "__module__", None) or module_name
+    home = getattr(unwrapped(found), "__module__", None) or module_name
     for each in (module_name, *([home] if _is_users(home) else [])):
         if each.partition(".")[0] != PACKAGE:
             _loaded[each] = f"{kind} {name}"
@@ -146,7 +145,7 @@ def make(kind: str, name: str, mission: Mission) -> object:
         takes = {}
     by_place = (inspect.Parameter.POSITIONAL_ONLY, inspect.Parameter.POSITIONAL_OR_KEYWORD)
     is_needed = [p.kind in by_place and p.default is p.empty for p in takes.values()]
-    if sum(is_needed) > 1 and not isinstance(_unwrapped(found), type):
+    if sum(is_needed) > 1 and not isinstance(unwrapped(found), type):
         return found
     try:
         if any(is_needed):
@@ -220,10 +219,3 @@ def _is_users(home: str) -> bool:
     file = getattr(sys.modules.get(home), "__file__", None)
     places = [sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")]
     return file is not None and not any(Path(file).is_relative_to(place) for place in places)
-
-
-def _unwrapped(found: object) -> object:
-    """Return the function or class that a partial one is made of."""
-    while isinstance(found, partial):
-        found = found.func
-    return found

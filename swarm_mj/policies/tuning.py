@@ -63,7 +63,7 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
 
 def read_table(path: Path) -> list[Tuned]:
     """Return the rows of a table; ValueError if it is no such table."""
-    _, rows = read_rows(path, "table", MAX_BYTES)
+    rows = read_rows(path, "table", MAX_BYTES)
     return msgspec.convert([row for _, row in rows], list[Tuned], strict=False)
 
 

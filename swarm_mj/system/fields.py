@@ -55,6 +55,10 @@ def setting(default: object = MISSING, help: str = "", **metadata: Any) -> Field
     return field(default=default, metadata=metadata | ({"help": help} if help else {}))
 
 
+# An option that `--help` shows and does not leave to `--help-all`.
+common_setting = partial(setting, is_common=True)
+
+
 def same_as(owner: type[Any], name: str) -> FieldOf:
     """Return a field like another dataclass's: its default, meaning and range."""
     spec = owner.__dataclass_fields__[name]
@@ -136,9 +140,15 @@ def check_kind(
 
 def name_of(part: object) -> str:
     """Return the name of a function or a class, or of an object's class, for messages."""
+    part = unwrapped(part)
+    return getattr(part, "__name__", type(part).__name__)
+
+
+def unwrapped(part: object) -> object:
+    """Return the function or class that a partial one is made of."""
     while isinstance(part, partial):
         part = part.func
-    return getattr(part, "__name__", type(part).__name__)
+    return part
 
 
 def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:

@@ -56,8 +56,8 @@ def check_size(what: str, size: int, most_bytes: int) -> None:
         raise ValueError(f"{what} may have up to {most_bytes} bytes, not {size}")
 
 
-def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[Row]]:
-    """Return a CSV file: the names of its columns, and its rows with the lines that they end on.
+def read_rows(path: Path, what: str, most_bytes: int) -> list[Row]:
+    """Return the rows of a CSV file, by the names of its columns, with the lines they end on.
 
     Raises ValueError as `read_file` does, or if it is no CSV with as many cells as columns.
     """
@@ -70,7 +70,7 @@ def read_rows(path: Path, what: str, most_bytes: int) -> tuple[list[str], list[R
     for line, row in rows:
         if None in row or None in row.values():
             raise ValueError(f"{what} {path}, line {line}: as many cells as columns are needed")
-    return list(reader.fieldnames or ()), rows
+    return rows
 
 
 def read_json(text: bytes | str, kind: type[Kind]) -> Kind:

@@ -74,12 +74,9 @@ def append_bytes(path: Path, content: bytes) -> None:
 def check_outputs(*outputs: Output, inputs: Iterable[Path] = (), must_be_new: bool = False) -> None:
     """Pass if a command can write all its files and loses none of its inputs.
 
-    Missing folders will be made.
-
-    Raises:
-        ValueError: A file exists, is a folder or an input, is named wrongly, or its folder cannot
-            be written; or two are the same.
-        OSError: The disk is full, fails, or is read-only.
+    Missing folders will be made. Raises ValueError if a file exists, is a folder or an input, is
+    named wrongly, or its folder cannot be written, or if two are the same; OSError if the disk is
+    full, fails, or is read-only.
     """
     named: dict[str, str] = {}
     sources = {os.path.realpath(path) for path in inputs}
@@ -118,11 +115,8 @@ def owned(path: Path) -> Iterator[None]:
 
     A hidden file beside it is locked. However this process ends, the kernel then unlocks it, so
     a file that a killed process left keeps no other out. Of the folders that were made, the empty
-    ones are removed in the end.
-
-    Raises:
-        ValueError: Another process owns it.
-        OSError: The folder, or the hidden file, cannot be written.
+    ones are removed in the end. Raises ValueError if another process owns it, and OSError if the
+    folder, or the hidden file, cannot be written.
     """
     target = path.resolve()
     made = [folder for folder in target.parents if not folder.exists()]

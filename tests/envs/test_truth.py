@@ -2,15 +2,15 @@
 
 import math
 import warnings
+from typing import Any
 
 import numpy as np
 import pytest
 from pettingzoo.test.state_test import state_test
 from pettingzoo.utils import parallel_to_aec
 
-from swarm_mj.envs.options import make_batch
+from swarm_mj.envs.options import make_batch, truth
 from swarm_mj.envs.pettingzoo import parallel_env
-from swarm_mj.envs.truth import truth
 from swarm_mj.mission import paper
 from swarm_mj.simulation.swarm import Swarm
 
@@ -30,6 +30,7 @@ def flown(num_windows, **options):
 def test_it_is_where_robots_are_and_how_old_what_they_know_is():
     seen, swarm = flown(6, failure_fraction=0.25)
     mission, states = swarm.mission, swarm.states
+    is_on = np.asarray(states.is_active)
     assert np.all(seen[:, 0] == np.float32(0.6))  # of the mission is flown
     for b in (0, 1):
         for i in range(4):
@@ -38,12 +39,12 @@ def test_it_is_where_robots_are_and_how_old_what_they_know_is():
             np.testing.assert_allclose(where, states.position_m[b, i], rtol=1e-5)
             speed = np.array([vx, vy]) * mission.max_velocity_mps
             np.testing.assert_allclose(speed, states.velocity_mps[b, i], rtol=1e-5)
-            assert is_active == states.is_active[b, i]
+            assert is_active == is_on[b, i]
             for j in range(4):
                 then = swarm.buffers.timestamp[b, i, j]
                 age = math.log(1.0 + 6.0 - then) / math.log(501.0) if then > 0.0 else 1.0
                 assert ages[j] == pytest.approx(age, abs=1e-6)
-    assert np.any(swarm.states.is_active == 0)
+    assert np.any(is_on == 0)
 
 
 def test_what_all_were_granted_at_the_start_has_an_age():
@@ -53,14 +54,15 @@ def test_what_all_were_granted_at_the_start_has_an_age():
 
 @pytest.mark.parametrize("task", ["stationary", "flocking"])
 def test_pettingzoos_own_check_of_the_state(task):
-    env = parallel_env(task, **SMALL, failure_fraction=0.25)
+    env: Any = parallel_env(task, **SMALL, failure_fraction=0.25)
+    whole: Any = parallel_env(task, **SMALL)
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        state_test(parallel_to_aec(parallel_env(task, **SMALL)), env)
+        state_test(parallel_to_aec(whole), env)
 
 
 def test_no_robot_observes_it():
-    env = parallel_env(**SMALL)
+    env: Any = parallel_env(**SMALL)
     env.reset(seed=1)
     view = env.observation_space("robot_0")
     assert sorted(view) == ["action_mask", "observation"]

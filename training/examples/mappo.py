@@ -18,8 +18,7 @@ from torch.distributions import Categorical
 
 import swarm_mj
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, MissionBatch
-from swarm_mj.envs.options import make_batch
-from swarm_mj.envs.truth import truth, truth_space
+from swarm_mj.envs.options import make_batch, truth, truth_space
 
 SEED, NUM_ROBOTS, NUM_WINDOWS = 0, 5, 100
 NUM_MISSIONS, NUM_ROUNDS = 16, 60  # flown side by side, and one after the other

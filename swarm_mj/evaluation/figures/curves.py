@@ -55,8 +55,7 @@ def preset_of(results: Sequence[Result]) -> str:
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
     """Select the results of a figure, in their order; skip other regimes.
 
-    Raises:
-        ValueError: There are none, or they cannot be compared with each other or with the paper.
+    Raises ValueError if there are none, or they cannot be compared with each other or the paper.
     """
     preset = preset_of(results)
     regime = figure.mission(preset)
