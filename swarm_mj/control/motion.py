@@ -47,8 +47,7 @@ class Costed(Protocol):
 def costed(controller: Controller) -> Costed | None:
     """Return a controller that has a task cost, or None.
 
-    Raises:
-        TypeError: It has a cost without a name or a unit.
+    Raises TypeError if it has a cost without a name or a unit.
     """
     if isinstance(controller, Costed):
         return controller

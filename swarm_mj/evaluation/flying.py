@@ -87,12 +87,8 @@ def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]
     """Return what an interrupted evaluation with this header has flown, by the batches' indices.
 
     A line that was cut off is dropped from the file; it is begun anew if not even its header, what
-    the batches depend on, was written.
-
-    Raises:
-        ValueError: The batches depended on something else, or the file is damaged or none of this
-            kind.
-        OSError: The file cannot be read or written.
+    the batches depend on, was written. Raises ValueError if the batches depended on something else,
+    or the file is damaged or none of this kind; OSError if it cannot be read or written.
     """
     content = read_file(path, "progress", MAX_BYTES)
     whole, _, cut_off = content.rpartition(b"\n")

@@ -33,8 +33,7 @@ class Processes:
 class Study:
     """The settings of an evaluation; all policies fly the same missions in each regime.
 
-    Raises:
-        ValueError: Nothing to evaluate, an unknown policy, or a number out of range.
+    Raises ValueError for nothing to evaluate, an unknown policy, or a number out of range.
     """
 
     policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones

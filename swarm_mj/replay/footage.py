@@ -9,19 +9,9 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import components_in
 from swarm_mj.physics.scene import Scene
+from swarm_mj.replay import links as compared
 from swarm_mj.replay import palette
-from swarm_mj.replay.links import (
-    PIECES,
-    Lines,
-    LinkMismatch,
-    LinkRows,
-    PacketPaths,
-    Positions,
-    by_kind,
-    divided,
-    ends,
-    shades,
-)
+from swarm_mj.replay.links import Lines, LinkMismatch, LinkRows, PacketPaths, Positions
 
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
 
@@ -145,9 +135,10 @@ class Footage:
     def mismatch_lines(self, row: int) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
         """Return the lines of one window's links [m], and their colours."""
         lines_m, colours = [], []
-        for kind, links in by_kind(self.links(row)).items():
-            lines_m.append(divided(ends(links, self.position_m, row), PIECES[kind]))
-            colours.append(np.repeat(shades(kind, links), len(PIECES[kind]), axis=0))
+        for kind, links in compared.by_kind(self.links(row)).items():
+            ends_m, pieces = compared.ends(links, self.position_m, row), compared.PIECES[kind]
+            lines_m.append(compared.divided(ends_m, pieces))
+            colours.append(np.repeat(compared.shades(kind, links), len(pieces), axis=0))
         return np.concatenate(lines_m), np.concatenate(colours)
 
     def shortfalls(self, row: int) -> tuple[Int16[np.ndarray, "K"], Int16[np.ndarray, "K"]]:

@@ -31,6 +31,8 @@ PLAIN = "{x:g}"  # a number on an axis
 LINE_IN = 0.165  # from one name to the next
 MORE = "+"  # after the names of methods whose packets carry more than T, M and P
 PLACE = 1.045  # of the axes' width
+# From a name to the end of its curve.
+ARROW = {"arrowstyle": "-", "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 4.0, "relpos": (0.0, 0.5)}
 ASIDE = 0.02  # likewise, from the end of a curve that ends early to its name
 PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
@@ -183,7 +185,8 @@ def name_ends(axes: Axes, shown: Sequence[Curve]) -> None:
 
 def _name(axes: Axes, curve: Curve, end: tuple[float, float], place: tuple[float, float]) -> None:
     look = look_of(curve.method)
-    line = {"color": look.colour, "linestyle": "--" if curve.is_published else "-"}
+    line: dict[str, Any] = {"color": look.colour}
+    line["linestyle"] = "--" if curve.is_published else "-"
     axes.annotate(
         name_of(curve),
         xy=end,
@@ -195,14 +198,7 @@ def _name(axes: Axes, curve: Curve, end: tuple[float, float], place: tuple[float
         va="center",
         annotation_clip=False,
         path_effects=[withStroke(linewidth=2.5, foreground="white")],  # over other curves
-        arrowprops={
-            **line,
-            "arrowstyle": "-",
-            "linewidth": 0.6,
-            "shrinkA": 1.0,
-            "shrinkB": 4.0,
-            "relpos": (0.0, 0.5),
-        },
+        arrowprops=line | ARROW,
     )
 
 
