@@ -10,7 +10,7 @@ from typing import Any
 from swarm_mj.cli.options import flags_of, nested, nested_option
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.mission.components import GROUP, SHOWN_AS, Components
-from swarm_mj.mission.specification import NEEDED
+from swarm_mj.mission.presets import NEEDED
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
@@ -88,7 +88,8 @@ def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
     flags = {spec.name: flags_of(spec)[0] for spec in SPECS}
     for name, (switch, value) in NEEDED.items():
         states = [getattr(mission, switch) for mission in missions]
-        if name in given and not any(s == value if value else s > 0.0 for s in states):
+        is_on = (value in s.split(",") if value else s > 0.0 for s in states)
+        if name in given and not any(is_on):
             shown = value or "above 0"
             raise ValueError(
                 f"{flags[name]} counts only with {flags[switch]} {shown}; give that too, or leave "

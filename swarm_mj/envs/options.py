@@ -119,6 +119,11 @@ def _check_reward(reward: str, mission: Mission, controller: Controller | None) 
         )
     if reward == "credit":
         check_whole("reward credit", mission)
+        if mission.clocks_differ:
+            raise ValueError(
+                "reward credit replays windows one by one, which takes a common clock; choose "
+                "another reward (credit team), or clock offset and drift 0"
+            )
 
 
 def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:

@@ -20,6 +20,7 @@ from types import ModuleType
 from typing import Any
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.presets import beyond_free_space
 from swarm_mj.system.fields import check_callable, did_you_mean, name_of, setting, unwrapped
 
 FORM = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
@@ -74,10 +75,10 @@ class Components:
         A named channel must not replace what the mission asks for.
         """
         named = {kind: each for kind, each in self.given.items() if isinstance(each, str)}
-        if "channel" in named and mission.beyond_free_space:
+        if "channel" in named and beyond_free_space(mission):
             raise ValueError(
                 f"channel {self.channel} takes the place of the mission's own, so "
-                f"{mission.beyond_free_space} would change nothing; leave out one of them"
+                f"{beyond_free_space(mission)} would change nothing; leave out one of them"
             )
         made = self
         for kind, name in named.items():

@@ -10,6 +10,24 @@ from typing import Any
 from swarm_mj.mission.specification import NOTHING, OPEN, Mission, Task
 from swarm_mj.system.fields import as_typed
 
+# The channel's effects beyond free space, unless they are one of `OFF`; and the numbers that count
+# only where an effect is on, or, if a value is named, where it is that.
+EFFECTS = (
+    "path_loss", "shadowing_db", "fading", "erasure", "burst_begin", "high_power_fraction",
+    "clock_offset_s", "clock_drift_ppm",
+)  # fmt: skip
+OFF = ("free-space", "none", 0)
+NEEDED: dict[str, tuple[str, str | None]] = {
+    "loss_exponent": ("path_loss", "log-distance"),
+    "reference_m": ("path_loss", "log-distance"),
+    "antenna_height_m": ("path_loss", "two-ray"),
+    "shadowing_distance_m": ("shadowing_db", None),
+    "rician_k": ("fading", "rician"),
+    "burst_end": ("burst_begin", None),
+    "high_power_db": ("high_power_fraction", None),
+    "map_offset_m": ("prior_knowledge", "map"),
+}
+
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     """Return the paper's text, taken literally, with any fields of `Mission` overridden.
@@ -59,12 +77,24 @@ PAPERS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": refere
 PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 
 
+def beyond_free_space(mission: Mission) -> str:
+    """Return the channel's differences from the paper's, in words; empty for free space."""
+    named: list[str] = []
+    for effect in EFFECTS:
+        # A fraction that rounds to no robot is no effect.
+        name = "num_high_power" if effect == "high_power_fraction" else effect
+        if (state := getattr(mission, name)) not in OFF:
+            counting = ((effect, None), (effect, state))
+            named += [name, *(number for number in NEEDED if NEEDED[number] in counting)]
+    return ", ".join(f"{name} {as_typed(getattr(mission, name))}" for name in named)
+
+
 def radio_in_words(mission: Mission) -> str:
     """Return what differs from the paper's radio, in words; empty if nothing does."""
-    numbers = ("sinr_threshold_db", "noise_dbm", "sensing_dbm")
+    numbers = ("sinr_threshold_db", "noise_dbm", "sensing_dbm", "map_offset_m")
     other = [name for name in numbers if getattr(mission, name) != getattr(Mission(), name)]
     words = [f"{name} {as_typed(getattr(mission, name))}" for name in other]
-    return ", ".join(filter(None, (mission.beyond_free_space, *words)))
+    return ", ".join(filter(None, (beyond_free_space(mission), *words)))
 
 
 def bits_per_second(rate: float) -> str:

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Literal, get_args
 
-from swarm_mj.system.fields import FieldOf, as_typed, check, check_names, setting
+from swarm_mj.system.fields import FieldOf, check, check_names, setting
 
 Preset = Literal["paper", "reference", "indoor", "urban", "open-field"]
 Task = Literal["stationary", "random-walk", "flocking"]
@@ -31,19 +31,6 @@ MIN_SURVIVORS = 2  # whatever the fraction that fails, so that there is an age o
 OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
-# The channel's effects beyond free space, unless they are one of `OFF`; and the numbers that count
-# only where an effect is on, or, if a value is named, where it is that.
-EFFECTS = ("path_loss", "shadowing_db", "fading", "erasure", "burst_begin", "high_power_fraction")
-OFF = ("free-space", "none", 0)
-NEEDED: dict[str, tuple[str, str | None]] = {
-    "loss_exponent": ("path_loss", "log-distance"),
-    "reference_m": ("path_loss", "log-distance"),
-    "antenna_height_m": ("path_loss", "two-ray"),
-    "shadowing_distance_m": ("shadowing_db", None),
-    "rician_k": ("fading", "rician"),
-    "burst_end": ("burst_begin", None),
-    "high_power_db": ("high_power_fraction", None),
-}
 NEW = "not the paper's"  # the source of what the paper has not
 
 
@@ -177,6 +164,12 @@ class Mission:
         0.0, "high-power fraction", "of the team", 0.0, 1.0, "robots with more transmit power"
     )
     high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0, "how much more that is")
+    clock_offset_s: float = _radio(
+        0.0, "clock offset", "s", 0.0, 10.0, "largest difference between clocks", may_lack=True
+    )
+    clock_drift_ppm: float = _radio(
+        0.0, "clock drift", "ppm", 0.0, 10_000.0, "largest drift of a clock", may_lack=True
+    )
     prior_knowledge: str = _choice(
         NOTHING,
         "prior knowledge",
@@ -186,6 +179,9 @@ class Mission:
         group=CHANNEL,
         is_joined=True,
         convert=in_order,
+    )
+    map_offset_m: float = _radio(
+        0.0, "map offset", "m", 0.0, 1e4, "how far east robots' map is of the truth", may_lack=True
     )
     bit_rate: float | None = _radio(
         None,
@@ -251,6 +247,16 @@ class Mission:
         return self.range_ratio * MISSION_DISTANCE_M
 
     @property
+    def slot_s(self) -> float:
+        """Length of a slot; a window has two (III-B) [s]."""
+        return self.window_s / 2.0
+
+    @property
+    def clocks_differ(self) -> bool:
+        """True if robots' slots begin at different times (VI)."""
+        return self.clock_offset_s > 0.0 or self.clock_drift_ppm > 0.0
+
+    @property
     def max_velocity_mps(self) -> float:
         """V_max: bound of the velocity per axis [m/s] (IV-B)."""
         return self.velocity_ratio * MISSION_DISTANCE_M / MISSION_DURATION_S
@@ -282,15 +288,3 @@ class Mission:
     def grants(self, what: str) -> bool:
         """Return whether robots know this before the mission."""
         return what in self.prior_knowledge.split(",")
-
-    @property
-    def beyond_free_space(self) -> str:
-        """The channel's differences from the paper's, in words; empty for free space."""
-        named: list[str] = []
-        for effect in EFFECTS:
-            # A fraction that rounds to no robot is no effect.
-            name = "num_high_power" if effect == "high_power_fraction" else effect
-            if (state := getattr(self, name)) not in OFF:
-                counting = ((effect, None), (effect, state))
-                named += [name, *(number for number in NEEDED if NEEDED[number] in counting)]
-        return ", ".join(f"{name} {as_typed(getattr(self, name))}" for name in named)

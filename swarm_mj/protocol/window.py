@@ -19,6 +19,7 @@ from swarm_mj.protocol.checks import checked_decode
 from swarm_mj.protocol.compiled_window import answer, silence, talk
 from swarm_mj.protocol.packets import PartialBuffers, entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 
 
@@ -162,16 +163,19 @@ def window(
         said = talk(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
         return tuple([Phase(said[s, 0], said[s, 1]) for s in range(num_slots)])
     record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    phases = []
+    phases, answers = [], recipient.copy()
     for slot in range(num_slots):
-        t = now + slot * SLOT_WINDOWS
-        observe_self(buffers, states, t)
-        sent_to = respondents(phases[0]) if slot else recipient.copy()
+        t, sent_to = now + slot * SLOT_WINDOWS, answers
         silence(sent_to, states.is_active)
         heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
         silence(heard, states.is_active)
-        merge(buffers, heard, entries_sent(buffers, sent_to))
-        phases.append(Phase(recipient=sent_to, heard=heard))
+        phases.append(punctual := Phase(recipient=sent_to, heard=heard))
+        if isinstance(channel, AsynchronousChannel):  # late packets carry what was known before
+            late, punctual = (Phase(*each) for each in channel.split(heard))
+            merge(buffers, late.heard, entries_sent(buffers, late.recipient))
+        observe_self(buffers, states, t)
+        merge(buffers, punctual.heard, entries_sent(buffers, punctual.recipient))
+        answers = respondents(punctual)
     return tuple(phases)
 
 

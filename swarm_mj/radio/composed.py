@@ -162,7 +162,7 @@ def _decode(
         air = _faded_air(received_mw[mission[w]], recipient[w], key, slot[w], rule)
         for j in range(num_robots):
             i = decoded(incoming_at(air, j), j, rule.noise_mw, rule.threshold)
-            heard[w, j] = j if i == j or _is_lost(i, j, key, slot[w], rule) else i
+            heard[w, j] = j if i == j or is_lost(i, j, key, slot[w], rule) else i
     return heard
 
 
@@ -182,16 +182,41 @@ def _faded_air(
             continue
         for j in range(recipient.shape[0]):
             if j != i:
-                power_mw = received_mw[i, j]
-                if rule.rician_k != NO_FADING:
-                    power_mw *= fade(link_key(fades, i, j), rule.rician_k)
+                power_mw = _faded(received_mw[i, j], fades, i, j, rule)
                 may_hear = recipient[j] == j or (hears_while_sending and recipient[i] == j)
                 add_to_air(air, i, j, power_mw if may_hear else 0.0, power_mw)
     return air
 
 
 @compiled()
-def _is_lost(i: int, j: int, key: np.uint64, slot: int, rule: Reception) -> bool:
+def faded_powers(
+    received_mw: Float[np.ndarray, "B N N"],
+    is_sender: Bool[np.ndarray, "B N"],
+    slot: Int[np.ndarray, "B"],
+    key: UInt64[np.ndarray, "B"],
+    rule: Reception,
+    power_mw: Float[np.ndarray, "B N N"],
+) -> None:
+    """Fill in the power of each packet at each other robot [mW]; 0 of a robot that is silent."""
+    num_missions, num_robots = is_sender.shape
+    for b in range(num_missions):
+        fades = mixed(mixed(key[b], _FADES), np.uint64(slot[b]))
+        for i in range(num_robots):
+            for j in range(num_robots):
+                is_heard = is_sender[b, i] and i != j
+                mean_mw = received_mw[b, i, j]
+                power_mw[b, i, j] = _faded(mean_mw, fades, i, j, rule) if is_heard else 0.0
+
+
+@compiled()
+def _faded(power_mw: float, fades: np.uint64, i: int, j: int, rule: Reception) -> float:
+    if rule.rician_k == NO_FADING:
+        return power_mw
+    return power_mw * fade(link_key(fades, i, j), rule.rician_k)
+
+
+@compiled()
+def is_lost(i: int, j: int, key: np.uint64, slot: int, rule: Reception) -> bool:
     """Return whether j loses i's packet although it is strong enough."""
     if rule.erasure > 0.0:
         erasures = mixed(mixed(key, _ERASURES), np.uint64(slot))

@@ -13,7 +13,9 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.presets import beyond_free_space
 from swarm_mj.physics.state import Obstacles
+from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
@@ -109,7 +111,7 @@ def mission_radio(
     truth is free space: nothing else is known of such a channel.
     """
     radio, belief = radio_of(mission), _belief(mission, obstacles)
-    if own is not None or not (mission.beyond_free_space or obstacles is not None):
+    if own is not None or not (beyond_free_space(mission) or obstacles is not None):
         channel = radio if own is None else own
         return MissionRadio(channel, belief, TrueLinks(radio=radio))
     composed = ComposedChannel(
@@ -118,13 +120,20 @@ def mission_radio(
         shadowing_db=mission.shadowing_db,
         shadowing_distance_m=mission.shadowing_distance_m,
     )
-    return MissionRadio(composed, belief, TrueLinks(radio=radio, channel=composed))
+    truth = TrueLinks(radio=radio, channel=composed)
+    if not mission.clocks_differ:
+        return MissionRadio(composed, belief, truth)
+    offset, drift = mission.clock_offset_s / mission.slot_s, 1e-6 * mission.clock_drift_ppm
+    return MissionRadio(AsynchronousChannel(composed, offset, drift), belief, truth)
 
 
 def _belief(mission: Mission, obstacles: Obstacles | None) -> Belief:
     """Return what the mission grants to know of its channel."""
-    radio, known = radio_of(mission), obstacles if mission.grants("map") else None
-    if mission.beyond_free_space and mission.grants("statistics"):
+    radio, known = radio_of(mission), None
+    if obstacles is not None and mission.grants("map"):
+        centre_m = obstacles.centre_m + np.array([mission.map_offset_m, 0.0, 0.0])
+        known = obstacles._replace(centre_m=centre_m)
+    if beyond_free_space(mission) and mission.grants("statistics"):
         return Belief(
             radio=radio,
             law=_law(mission, radio, known),

@@ -136,6 +136,7 @@ SWITCHES = {
     "--rician-k 3": "--fading rician",
     "--burst-end 0.1": "--burst-begin above 0",
     "--high-power-db 3": "--high-power-fraction above 0",
+    "--map-offset-m 3": "--prior-knowledge map",
 }
 
 

@@ -9,6 +9,7 @@ import pytest
 
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
+from swarm_mj.mission.presets import beyond_free_space
 from swarm_mj.system.fields import kind_of
 
 # As users load it: without the type checks that these tests run under, which would answer first.
@@ -76,6 +77,9 @@ NOTHING_UNLESS_ASKED = {
     "erasure",
     "burst_begin",
     "high_power_fraction",
+    "clock_offset_s",
+    "clock_drift_ppm",
+    "map_offset_m",
 }
 
 
@@ -162,7 +166,7 @@ def test_a_mission_cannot_change():
     ],
 )
 def test_what_the_channel_has_beyond_free_space_is_told_in_words(fields, said):
-    assert paper(**fields).beyond_free_space == said
+    assert beyond_free_space(paper(**fields)) == said
 
 
 @pytest.mark.parametrize(

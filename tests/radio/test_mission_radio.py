@@ -234,3 +234,17 @@ def test_true_links_decode_as_often_as_the_channel_lets_them(fields):
         often = np.mean(in_slots(places_m, recipient) == i, axis=0)
         others = np.arange(4) != i
         np.testing.assert_allclose(often[others], expected[i, others], atol=0.04)
+
+
+@pytest.mark.parametrize(("offset_m", "behind_wall"), [(0.0, (0, 1)), (50.0, (1, 2))])
+def test_a_map_that_is_wrong_shows_obstacles_east_of_their_places(offset_m, behind_wall):
+    """The wall of 10 dB stands at x = 0, and on the other map at 50 m."""
+    position_m = np.array([[-20.0, 0.0], [20.0, 0.0], [80.0, 0.0]])
+    mission = paper(num_robots=3, prior_knowledge="map", map_offset_m=offset_m)
+    radio = mission_radio(mission, WALL)
+    for i, j in ((0, 1), (1, 2)):
+        squared_m2 = np.sum((position_m[i] - position_m[j]) ** 2)
+        free_mw = radio.belief.radio.received_at_1_m_mw / squared_m2
+        loss = 0.1 if (i, j) == behind_wall else 1.0
+        believed_mw = radio.belief.links(position_m).received_mw[i, j]
+        assert believed_mw == pytest.approx(loss * free_mw)

@@ -1,0 +1,149 @@
+"""Asynchronous clocks (VI): packets that robots send early or late, and that overlap in part.
+
+All robots decide when a slot of the earliest clock begins; each transmits when its own begins. A
+packet takes `AIRTIME` of a slot, and the rest is a guard interval. A packet that has not ended by
+the next decision is late: it counts as decoded in the next slot. Another packet interferes with the
+share of it that both overlap. Index order: `[p, b, i, j]` is robot `i`, which sends in slot `p` of
+three, the last of them now, and `j`, which receives.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float, Int, UInt64
+
+from swarm_mj.radio.composed import ComposedChannel, Reception, faded_powers, is_lost
+from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.reception import is_received, sinr
+from swarm_mj.system.compiled import compiled
+
+AIRTIME = 0.8  # of a slot
+GUARD = 1.0 - AIRTIME
+NUM_SLOTS = 3  # packets overlap those of the slots before and after their own
+
+
+class AsynchronousChannel:
+    """A channel between robots whose clocks differ; slots must be played in order, and once."""
+
+    def __init__(self, channel: ComposedChannel, offset: float, drift: float) -> None:
+        """Take the greatest offset [slots] and drift [1]; robots' own are drawn uniformly."""
+        self._channel, self._most = channel, (offset, drift)
+
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Start new missions; the clocks are drawn after all else."""
+        self._channel.start(num_robots, rngs)
+        drawn = np.stack([rng.random((2, num_robots)) for rng in rngs])
+        offset, drift = self._most
+        self._offset, self._drift = offset * drawn[:, 0], drift * (2.0 * drawn[:, 1] - 1.0)
+        self._silence = np.broadcast_to(np.arange(num_robots), self._offset.shape)
+        self._lag = np.zeros((NUM_SLOTS, *self._offset.shape))
+        self._recipient = np.stack([self._silence] * NUM_SLOTS)
+        self._power_mw = np.zeros((*self._lag.shape, num_robots))
+
+    def at(self, slot: Int[np.ndarray, "B"], mission: Int[np.ndarray, "B"]) -> Channel:
+        """Return the channel of the next slot, in all missions in order."""
+        return lambda position_m, recipient: self._heard(position_m, recipient, slot, mission)
+
+    def lag(self, slot: Int[np.ndarray, "B"]) -> Float[np.ndarray, "B N"]:
+        """Return how far each robot's slots are behind those of its team's earliest [slots].
+
+        A robot that falls behind by a whole slot is as one that keeps up: numbers are common.
+        """
+        clock = self._offset + self._drift * slot[:, np.newaxis]
+        return (clock - np.min(clock, axis=1, keepdims=True)) % 1.0
+
+    def _heard(
+        self,
+        position_m: Float[np.ndarray, "B N 2"],
+        recipient: Int[np.ndarray, "B N"],
+        slot: Int[np.ndarray, "B"],
+        mission: Int[np.ndarray, "B"],
+    ) -> Int[np.ndarray, "B N"]:
+        for kept in (self._lag, self._recipient, self._power_mw):
+            kept[:-1] = kept[1:]
+        key, rule = self._channel.key, self._channel.reception
+        is_sender = recipient != self._silence
+        mean_mw = self._channel.received_mw(position_m, mission, is_sender)
+        faded_powers(mean_mw, is_sender, slot, key, rule, self._power_mw[-1])
+        self._lag[-1], self._recipient[-1] = self.lag(slot), recipient
+        return decode_overlapping(self._lag, self._recipient, self._power_mw, slot, key, rule)
+
+    def split(
+        self, heard: Int[np.ndarray, "B N"]
+    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
+        """Return the recipients and the receptions of the last slot's late packets, and of others.
+
+        All are [B, N]; `heard` is what was decoded in this slot.
+        """
+        is_late, silence = self._lag > GUARD, self._silence
+        late = np.where(is_late[-2], self._recipient[-2], silence)
+        punctual = np.where(is_late[-1], silence, self._recipient[-1])
+        came_late = np.take_along_axis(late, heard, axis=1) != heard
+        heard_late, heard_now = np.where(came_late, (heard, silence), (silence, heard))
+        return (late, heard_late), (punctual, heard_now)
+
+
+@compiled()
+def decode_overlapping(
+    lag: Float[np.ndarray, "3 B N"],
+    recipient: Int[np.ndarray, "3 B N"],
+    power_mw: Float[np.ndarray, "3 B N N"],
+    slot: Int[np.ndarray, "B"],
+    key: UInt64[np.ndarray, "B"],
+    rule: Reception,
+) -> Int[np.ndarray, "B N"]:
+    """Return the sender of the strongest packet that ends now and decodes, at each receiver.
+
+    Robots that are silent have no power.
+    """
+    _, num_missions, num_robots = lag.shape
+    heard = np.empty((num_missions, num_robots), dtype=np.int64)
+    for b in range(num_missions):
+        for j in range(num_robots):
+            heard[b, j], strongest_mw = j, 0.0
+            for p in range(1, NUM_SLOTS):
+                for i in range(num_robots):
+                    is_late, signal_mw = lag[p, b, i] > GUARD, power_mw[p, b, i, j]
+                    if is_late == (p == NUM_SLOTS - 1) or signal_mw <= strongest_mw:
+                        continue
+                    over_noise = sinr(signal_mw, 0.0, rule.noise_mw)
+                    if not is_received(over_noise, rule.threshold):
+                        continue
+                    jam_mw = _interference(
+                        lag[:, b], recipient[:, b], power_mw[:, b], p, i, j, rule
+                    )
+                    ratio = sinr(signal_mw, jam_mw, rule.noise_mw)
+                    is_clear = is_received(ratio, rule.threshold)
+                    if is_clear and not is_lost(i, j, key[b], slot[b], rule):
+                        heard[b, j], strongest_mw = i, signal_mw
+    return heard
+
+
+@compiled()
+def _interference(
+    lag: Float[np.ndarray, "3 N"],
+    recipient: Int[np.ndarray, "3 N"],
+    power_mw: Float[np.ndarray, "3 N N"],
+    p: int,
+    i: int,
+    j: int,
+    rule: Reception,
+) -> float:
+    """Return the mean power of all others while i's packet of slot p is at j [mW].
+
+    It is infinite if j transmits meanwhile, unless it hears all the same.
+    """
+    total_mw = 0.0
+    hears = rule.recipient_hears_while_sending and recipient[p, i] == j
+    for q in range(NUM_SLOTS):
+        for k in range(recipient.shape[1]):
+            if recipient[q, k] == k or k == i:
+                continue
+            apart = abs(p - q + lag[p, i] - lag[q, k])  # between the packets' beginnings [slots]
+            if apart < AIRTIME:
+                share = 1.0 - apart / AIRTIME
+                if k != j:
+                    total_mw += share * power_mw[q, k, j]
+                elif not hears:
+                    return np.inf
+    return total_mw
