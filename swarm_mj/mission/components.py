@@ -15,6 +15,7 @@ import traceback
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -31,6 +32,7 @@ CALLED_WITH = {  # the kinds of components, and the arguments of each
     "controller": ("buffers", "states"),
     "scene": ("spec", "mission"),
 }
+TABLE, TABLE_CHANNEL = "table:", "swarm_mj.radio.gain_table:GainTable"
 PACKAGE = __name__.partition(".")[0]
 _loaded: dict[str, str] = {}  # modules of users' code, and what a message calls it
 
@@ -43,7 +45,7 @@ class Components:
     """
 
     # Any admits objects; files and command lines hold names only.
-    channel: Any = setting(None, "who decodes whose packet", shown="free space", **OWN)
+    channel: Any = setting(None, "who decodes whom; or table:FILE", shown="free space", **OWN)
     controller: Any = setting(None, "what drives the robots", shown="the task's", **OWN)
     scene: Any = setting(None, "a function that adds obstacles", shown="none", **OWN)
 
@@ -137,7 +139,10 @@ def make(kind: str, name: str, mission: Mission) -> object:
     `functools.partial`, by which one file holds a component with several values of its numbers.
     Raises ValueError as `load` does, and if what it names cannot be called so, or raises.
     """
-    found = load(kind, name)
+    is_table = kind == "channel" and name.startswith(TABLE)
+    found: Any = load(kind, TABLE_CHANNEL if is_table else name)  # its room may not be imported
+    if is_table:
+        found = partial(found, path=Path(name.removeprefix(TABLE)))
     if not callable(found):
         return found
     try:
@@ -158,8 +163,9 @@ def make(kind: str, name: str, mission: Mission) -> object:
 
 
 def digest(name: str) -> str:
-    """Return a hash of the file that holds code which was loaded; empty if there is none."""
-    file = getattr(sys.modules.get(name.partition(":")[0]), "__file__", None)
+    """Return a hash of the table, or of the file of loaded code; empty if there is none."""
+    table = name.removeprefix(TABLE) if name.startswith(TABLE) else ""
+    file = table or getattr(sys.modules.get(name.partition(":")[0]), "__file__", None)
     return hashlib.sha256(Path(file).read_bytes()).hexdigest()[:12] if file else ""
 
 

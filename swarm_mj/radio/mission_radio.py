@@ -108,12 +108,13 @@ def mission_radio(
     """Return a mission's channel, belief and truth.
 
     A user's own channel takes the place of the mission's. Belief stays that of the mission, and
-    truth is free space: nothing else is known of such a channel.
+    truth is free space, as nothing else is known of such a channel unless it is a table.
     """
     radio, belief = radio_of(mission), _belief(mission, obstacles)
     if own is not None or not (beyond_free_space(mission) or obstacles is not None):
         channel = radio if own is None else own
-        return MissionRadio(channel, belief, TrueLinks(radio=radio))
+        known = own if isinstance(own, ComposedChannel) else None  # a table of gains
+        return MissionRadio(channel, belief, TrueLinks(radio=radio, channel=known))
     composed = ComposedChannel(
         _law(mission, radio, obstacles),
         _reception(mission, radio),

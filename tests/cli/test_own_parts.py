@@ -95,6 +95,13 @@ def test_a_flight_with_parts_of_ones_own(succeed, tmp_path):
     assert json.loads((tmp_path / "b.json").read_text())["aoi_mean"] == flown["aoi_mean"]
 
 
+def test_a_flight_over_a_table_of_gains(succeed, tmp_path):
+    places = [f"{x},0,{x},{100 + y},-60" for x in (-100, 0, 100) for y in range(3)]
+    (tmp_path / "gains.csv").write_text("\n".join(["x1_m,y1_m,x2_m,y2_m,gain_db", *places]))
+    done = succeed("evaluate", *SMALL, "--policy", "tdma", "--channel", "table:gains.csv")
+    assert "table:gains.csv" in done.stdout
+
+
 def test_an_evaluation_makes_them_in_every_process_and_says_which(succeed, tmp_path):
     evaluate = ("evaluate", *SMALL, *ALL, "--policy", "my_parts:Coin", "mst", "--episodes", 30)
     for name, jobs in (("one", 1), ("two", 2)):

@@ -1,0 +1,61 @@
+"""A channel from a table of gains between pairs of places, measured or computed by ray tracing.
+
+What differs from free space is interpolated, in dB: gains rise without limit towards a sender, but
+what walls, ground and antennas make of them changes slowly from place to place.
+"""
+
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from swarm_mj.mission import Mission
+from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.power_law import free_space_law
+from swarm_mj.radio.reception import MIN_DISTANCE_M
+from swarm_mj.system.decibels import from_db, to_db
+from swarm_mj.system.reading import open_file
+
+HEADER = "x1_m,y1_m,x2_m,y2_m,gain_db"
+NUM_NEAREST = 8  # pairs of the table that a link is interpolated from
+
+
+class GainTable(ComposedChannel):
+    """A mission's radio over the links of a table, which are the same in both directions."""
+
+    def __init__(self, mission: Mission, path: Path) -> None:
+        """Read a CSV file; raise ValueError if it is no such table."""
+        from scipy.spatial import KDTree  # slow to import
+
+        radio = radio_of(mission)
+        law = free_space_law(radio.received_at_1_m_mw, mission.num_robots)
+        hears = radio.recipient_hears_while_sending
+        rule = Reception(radio.noise_mw, radio.threshold, recipient_hears_while_sending=hears)
+        super().__init__(law, rule)
+        with open_file(path, "table of gains") as file:
+            header = file.readline().decode("utf-8-sig").strip()
+            rows = np.loadtxt(file, delimiter=",", ndmin=2) if header == HEADER else np.empty(0)
+        if len(rows) < NUM_NEAREST or not np.all(np.isfinite(rows)):
+            least = f"{NUM_NEAREST} rows of finite numbers or more, with -150 dB for no link"
+            raise ValueError(f"a table of gains has a first line {HEADER}, then {least}")
+        ends_m, received_mw = rows[:, :4], radio.power_mw * from_db(rows[:, 4])
+        apart_m = np.maximum(np.hypot(*(ends_m[:, :2] - ends_m[:, 2:]).T), MIN_DISTANCE_M)
+        self._beyond_db = np.tile(to_db(received_mw * apart_m**2 / radio.received_at_1_m_mw), 2)
+        self._pairs = KDTree(np.concatenate([ends_m, np.roll(ends_m, 2, axis=1)]))
+
+    def received_mw(
+        self,
+        position_m: Float[np.ndarray, "W N 2"],
+        mission: Int[np.ndarray, "W"],
+        is_sender: Bool[np.ndarray, "W N"],
+    ) -> Float[np.ndarray, "B N N"]:
+        """Return the power of sender i at robot j [mW]; of others, anything."""
+        power_mw = super().received_mw(position_m, mission, is_sender).copy()
+        for b, place_m, sends in zip(mission, position_m, is_sender, strict=True):
+            i, j = np.nonzero(sends[:, np.newaxis] & ~np.eye(len(sends), dtype=np.bool_))
+            away_m, pair = self._pairs.query(np.hstack([place_m[i], place_m[j]]), NUM_NEAREST)
+            weight = np.maximum(away_m, MIN_DISTANCE_M) ** -2.0  # Shepard 1968
+            beyond_db = np.sum(weight * self._beyond_db[pair], axis=1) / np.sum(weight, axis=1)
+            power_mw[b, i, j] *= from_db(beyond_db)
+        return power_mw
