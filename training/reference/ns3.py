@@ -19,6 +19,7 @@ from pathlib import Path
 
 import numpy as np
 
+import swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.radio.free_space import path_loss_db
@@ -103,6 +104,7 @@ class Settings:
                     GOLDEN.mkdir(parents=True, exist_ok=True)
                     np.savez_compressed(GOLDEN / f"{name}.npz", allow_pickle=False, **arrays)
                 changed += differences(name, arrays)
+            changed += moved_apart(program, Path(folder))
         return 1 if changed else 0
 
 
@@ -133,10 +135,7 @@ def asked(program: Path, scenes: Scenes, seed: int) -> Arrays:
     for places, sends in zip(position_m, is_sender, strict=True):
         words = [len(sends), *sends.astype(int).tolist(), *places.ravel().tolist()]
         lines.append(f"scene {' '.join(map(repr, words))}")
-    said = subprocess.run(
-        [str(program)], input="\n".join(lines), capture_output=True, check=True, encoding="utf-8"
-    ).stdout
-    rows = np.array([line.split() for line in said.splitlines()], dtype=np.float64)
+    rows = np.array(said_by(program, lines))
     decodes, decodes_if_silent, received_mw = np.zeros((3, *is_sender.shape, mission.num_robots))
     decodes[is_sender], decodes_if_silent[is_sender], received_mw[is_sender] = (
         rows[0::3],
@@ -153,6 +152,29 @@ def asked(program: Path, scenes: Scenes, seed: int) -> Arrays:
         "law": np.array(scenes.law),
         "made_by": np.array(f"ns-3 {VERSION}: make reference ARGS=--record"),
     }
+
+
+def moved_apart(program: Path, folder: Path) -> int:
+    """Return where and when a trace of `tools/mobility.py` is off by a millimetre in ns-3."""
+    replay, trace, table = (folder / f"walk.{suffix}" for suffix in ("rrd", "tcl", "csv"))
+    swarm_mj.fly("random-walk", policy="tdma", num_robots=10, num_windows=200).save(replay)
+    for out in (trace, table):
+        tool = [sys.executable, str(ROOT / "tools" / "mobility.py"), str(replay)]
+        subprocess.run([*tool, "--out", str(out)], check=True, capture_output=True)
+    expected = np.loadtxt(table, delimiter=",", skiprows=1).reshape(-1, 10, 4)
+    times = " ".join(map(repr, expected[:, 0, 0].tolist()))
+    found_m = np.array(said_by(program, [f"moves {trace} 10 {times}"])).reshape(-1, 10, 2)
+    off_m = np.linalg.norm(found_m - expected[..., 2:], axis=2)
+    print(f"mobility: {off_m.size} places, off by {1e3 * off_m.max():.2g} mm at most")
+    return int(np.sum(off_m > 1e-3))
+
+
+def said_by(program: Path, lines: list[str]) -> list[list[float]]:
+    """Return the lines of numbers with which ns-3 answers these."""
+    said = subprocess.run(
+        [str(program)], input="\n".join(lines), capture_output=True, check=True, encoding="utf-8"
+    ).stdout
+    return [list(map(float, line.split())) for line in said.splitlines()]
 
 
 def drawn(scenes: Scenes, rng: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:

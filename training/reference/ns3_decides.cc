@@ -6,6 +6,7 @@
 //
 //   radio POWER_W NOISE_W THRESHOLD HZ FADES LAW [NUMBERS]  the radio of all robots from here on
 //   scene N SENDERS.. X Y ..                                N marks, 1 of a sender; then all places
+//   moves FILE N TIMES..                                    where a trace has N robots at times [s]
 
 #include "ns3/core-module.h"
 #include "ns3/mobility-module.h"
@@ -225,6 +226,31 @@ WriteScene(const Radio& radio, const Scene& scene)
     }
 }
 
+// A line for each time, of all robots' positions [m].
+void
+WriteMoves(std::istream& line)
+{
+    std::string file;
+    int num;
+    line >> file >> num;
+    NodeContainer robots;
+    robots.Create(num);
+    Ns2MobilityHelper(file).Install();
+    for (double time; line >> time;)
+    {
+        Simulator::Schedule(Seconds(time), [robots] {
+            for (auto robot = robots.Begin(); robot != robots.End(); ++robot)
+            {
+                auto place = (*robot)->GetObject<MobilityModel>()->GetPosition();
+                std::cout << place.x << ' ' << place.y << ' ';
+            }
+            std::cout << '\n';
+        });
+    }
+    Simulator::Run();
+    Simulator::Destroy();
+}
+
 } // namespace
 
 int
@@ -245,6 +271,10 @@ main()
         else if (word == "scene")
         {
             WriteScene(radio, ReadScene(line));
+        }
+        else if (word == "moves")
+        {
+            WriteMoves(line);
         }
     }
     return 0;
