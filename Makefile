@@ -137,8 +137,9 @@ figures: setup
 	    $$(ls training/results/reproduce/$(SCALE)/$$name.csv 2>/dev/null) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
-	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig4 fig5 fig6 --policy $(OURS) \
+	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig5 fig6 --policy $(OURS) \
 	  --out assets/figures/policies --force
+	$(BIN)/python training/limits_figure.py
 	$(BIN)/python training/readme_figure.py
 	$(BIN)/python training/large_teams_figure.py
 	$(BIN)/python training/learning_figure.py

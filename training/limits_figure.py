@@ -1,0 +1,94 @@
+"""Teams at rest between what no policy can go below and what a search has found (Fig. 4).
+
+    python training/limits_figure.py
+
+Draws assets/figures/policies/fig4.svg and .png from `training/results/`: the package's policies,
+the floor of `bounds.py`, proven for every policy, and the schedules of `ceiling.py`.
+"""
+
+import math
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from swarm_mj.cli import script
+from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
+from swarm_mj.evaluation.figures.drawing import draw_curves
+from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.published import RESULT_FIGURES
+from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.system.fields import setting
+from swarm_mj.system.reading import read_rows
+from swarm_mj.system.writing import Output, check_outputs
+
+ROOT = Path(__file__).resolve().parent.parent
+MOST_BYTES = 10_000_000
+FIGURE = RESULT_FIGURES["fig4"]
+METHODS = (
+    *("planner", "planner --payload none", "gnn", "spatial-tdma", "tdma", "gossip", "aloha"),
+    *("random-flooding", "training.ceiling:Annealed"),
+)
+
+
+@dataclass(frozen=True, kw_only=True)
+class LimitsFigure:
+    """Where the figure goes, and where its numbers are."""
+
+    out: Path = setting(
+        ROOT / "assets" / "figures" / "policies" / "fig4",
+        "the files, without their endings",
+        shown="assets/figures/policies/fig4",
+    )
+    results: Path = setting(
+        ROOT / "training" / "results", "where they are", metavar="DIR", shown="training/results"
+    )
+
+    def __call__(self) -> int:
+        """Draw the figure; return the exit code."""
+        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
+        check_outputs(*(Output("figure", path) for path in paths))
+        files = [self.results / f"{name}.csv" for name in ("paper-stationary", "ceiling")]
+        figure = draw_limits(
+            [result for file in files for result in read_results(file)],
+            *read_floor(self.results / "floor.csv"),
+        )
+        for path in paths:
+            save(figure, path)
+        return 0
+
+
+def read_floor(path: Path) -> tuple[Curve, str]:
+    """Return the mean floor by range ratio, and its commit.
+
+    Raises ValueError if the file cannot be read, or is not of one commit.
+    """
+    rows = [row for _, row in read_rows(path, "table of floors", MOST_BYTES)]
+    found: dict[float, list[float]] = {}
+    for row in rows:
+        found.setdefault(float(row["range_ratio"]), []).append(float(row["floor_windows"]))
+    made_by, *others = {row["commit"] for row in rows}
+    if others:
+        raise ValueError(f"{path} must be of one commit, not {', '.join([made_by, *others])}")
+    x = np.array(sorted(found))
+    return Curve(
+        method="floor",
+        x=x,
+        mean=np.array([np.mean(found[ratio]) for ratio in x]),
+        sem=np.array([np.std(found[r], ddof=1) / math.sqrt(len(found[r])) for r in x]),
+    ), made_by
+
+
+def draw_limits(results: Sequence[Result], floor: Curve, made_by: str) -> Figure:
+    """Draw the policies' curves above the floor; its commit stands below with theirs."""
+    found = [result for result in results_of(FIGURE, results) if result.policy in METHODS]
+    (panel,) = FIGURE.panels
+    shown = [curve for curve in curves(FIGURE, panel.cost, found) if curve.method in METHODS]
+    return draw_curves(FIGURE, [*found, replace(found[0], commit=made_by)], [[*shown, floor]])
+
+
+if __name__ == "__main__":
+    sys.exit(script(LimitsFigure, LimitsFigure.__call__))
