@@ -7,7 +7,10 @@ Where the paper's text and its authors' code differ, each difference is a field 
 import math
 from dataclasses import dataclass
 from functools import partial
+from pathlib import Path
 from typing import Any, Literal, get_args
+
+import msgspec
 
 from swarm_mj.system.fields import FieldOf, check, check_names, setting
 
@@ -32,6 +35,12 @@ OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
 NEW = "not the paper's"  # the source of what the paper has not
+HELP = msgspec.toml.decode(Path(__file__).with_name("options.toml").read_bytes())  # by labels
+
+
+def _named(label: str, default: object, **about: Any) -> FieldOf:
+    """Return a field with a name in words; with a help text, it is an option."""
+    return setting(default, HELP.get(label, ""), label=label, **about)
 
 
 def _number(
@@ -40,23 +49,20 @@ def _number(
     unit: str,
     low: float,
     high: float,
-    help: str = "",
     **more: str | bool,
 ) -> FieldOf:
-    """Return a number: name in words, unit, range; with help, an option. By default of IV-B."""
-    about = {"source": "IV-B"} | more
-    return setting(default, help, label=label, unit=unit, low=low, high=high, **about)
+    """Return a number: name in words, unit, range. By default it is of IV-B."""
+    about: dict[str, Any] = {"source": "IV-B", "unit": unit, "low": low, "high": high}
+    return _named(label, default, **about | more)
 
 
 # Numbers of the channel beyond free space are options under a heading of their own.
 _radio = partial(_number, group=CHANNEL, source=NEW)
 
 
-def _choice(
-    default: str, label: str, source: str, choices: object, help: str = "", **about: Any
-) -> FieldOf:
+def _choice(default: str, label: str, source: str, choices: object, **about: Any) -> FieldOf:
     """Return one of several names, given as a `Literal`."""
-    return setting(default, help, label=label, source=source, choices=get_args(choices), **about)
+    return _named(label, default, source=source, choices=get_args(choices), **about)
 
 
 def in_order(prior_knowledge: str) -> str:
@@ -70,138 +76,57 @@ def in_order(prior_knowledge: str) -> str:
 class Mission:
     """A mission's numbers; the defaults are the paper's text (IV-B).
 
-    A field with a help text is an option, too: `num_robots` is `--robots` (`cli.options`).
+    A field with a help text (`options.toml`) is an option, too: `num_robots` is `--robots`.
 
     Raises:
         ValueError: A field is outside its range; the message names the value and the range.
         TypeError: There is no such field; the message names the one most like it.
     """
 
-    preset: str = _choice(
-        "paper", "preset", "IV-B", Preset, "the paper's text or code, or an arena with its channel"
-    )
-    task: Task = _choice("flocking", "task", "IV", Task, "what the robots do")
-    num_robots: int = _number(40, "number of robots", "robots", 2.0, 10_000.0, "size of the team")
+    preset: str = _choice("paper", "preset", "IV-B", Preset)
+    task: Task = _choice("flocking", "task", "IV", Task)
+    num_robots: int = _number(40, "number of robots", "robots", 2.0, 10_000.0)
     density_per_km2: float = _number(40.0, "density", "robots/km²", 0.1, 10_000.0)
-    range_ratio: float = _number(
-        0.25, "range ratio", "of 1 km", 0.01, 10.0, "range of a packet in silence"
-    )
-    velocity_ratio: float = _number(
-        0.15, "velocity ratio", "of 1 km in 50 s", 0.001, 5.0, "per axis; 0.15 is 3 m/s"
-    )
+    range_ratio: float = _number(0.25, "range ratio", "of 1 km", 0.01, 10.0)
+    velocity_ratio: float = _number(0.15, "velocity ratio", "of 1 km in 50 s", 0.001, 5.0)
     max_acceleration_mps2: float = _number(20.0, "A_max", "m/s²", 0.01, 1000.0)
     window_s: float = _number(0.1, "window", "s", 0.01, 10.0)
-    num_windows: int = _number(
-        500, "number of windows", "windows", 1.0, 100_000.0, "length, in windows of 100 ms"
-    )
+    num_windows: int = _number(500, "number of windows", "windows", 1.0, 100_000.0)
     # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
-    sinr_threshold_db: float = _number(
-        1.0, "SINR threshold", "dB", -30.0, 60.0, "least SINR that decodes", group=CHANNEL
-    )
-    noise_dbm: float = _number(
-        -50.0, "noise power", "dBm", -200.0, 50.0, "transmit power follows it", group=CHANNEL
-    )
+    sinr_threshold_db: float = _number(1.0, "SINR threshold", "dB", -30.0, 60.0, group=CHANNEL)
+    noise_dbm: float = _number(-50.0, "noise power", "dBm", -200.0, 50.0, group=CHANNEL)
     sensing_dbm: float | None = _radio(  # files of development versions lack it
-        None,
-        "sensing threshold",
-        "dBm",
-        -200.0,
-        50.0,
-        "power that csma and age-gain-csma sense",
-        may_lack=True,
+        None, "sensing threshold", "dBm", -200.0, 50.0, may_lack=True
     )
     frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
-    failure_fraction: float = _number(
-        0.0, "failure fraction", "of the team", 0.0, 0.9, "robots that fail half-way", source=NEW
-    )
-    arena: str = setting(
-        OPEN,
-        "what stands in the area: open, blocks, forest, rooms, or an MJCF file",
-        metavar="NAME",
-        label="arena",
-    )
+    failure_fraction: float = _number(0.0, "failure fraction", "of the team", 0.0, 0.9, source=NEW)
+    arena: str = _named("arena", OPEN, metavar="NAME")
 
     # The channel beyond the paper's free space (`radio.mission_radio`).
-    path_loss: PathLossLaw = _choice(
-        "free-space",
-        "path loss",
-        "Eq. 1",
-        PathLossLaw,
-        "how power falls with distance",
-        group=CHANNEL,
-    )
-    loss_exponent: float = _radio(
-        3.0, "path loss exponent", "1", 1.0, 10.0, "slope of log-distance: 2 is free space's"
-    )
-    reference_m: float = _radio(
-        20.0, "reference distance", "m", 0.1, 10_000.0, "where log-distance begins"
-    )
-    antenna_height_m: float = _radio(
-        1.0, "antenna height", "m", 0.1, 100.0, "above the floor, for two-ray"
-    )
-    shadowing_db: float = _radio(
-        0.0, "shadowing", "dB", 0.0, 30.0, "standard deviation of log-normal shadowing"
-    )
-    shadowing_distance_m: float = _radio(
-        20.0, "shadowing distance", "m", 0.1, 10_000.0, "over which its correlation falls to 1/e"
-    )
-    fading: FadingLaw = _choice(
-        "none", "fading", NEW, FadingLaw, "of every link, anew in each slot", group=CHANNEL
-    )
-    rician_k: float = _radio(
-        4.0, "Rician K", "1", 0.0, 10_000.0, "power in line of sight over scattered; 0: Rayleigh"
-    )
-    erasure: float = _radio(
-        0.0, "erasure probability", "1", 0.0, 0.99, "share of packets lost at each receiver"
-    )
-    burst_begin: float = _radio(
-        0.0, "burst begin", "per slot", 0.0, 0.5, "probability that a receiver goes deaf"
-    )
-    burst_end: float = _radio(
-        0.05, "burst end", "per slot", 0.001, 0.5, "probability that it hears again"
-    )
-    high_power_fraction: float = _radio(
-        0.0, "high-power fraction", "of the team", 0.0, 1.0, "robots with more transmit power"
-    )
-    high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0, "how much more that is")
-    clock_offset_s: float = _radio(
-        0.0, "clock offset", "s", 0.0, 10.0, "largest difference between clocks", may_lack=True
-    )
-    clock_drift_ppm: float = _radio(
-        0.0, "clock drift", "ppm", 0.0, 10_000.0, "largest drift of a clock", may_lack=True
-    )
+    path_loss: PathLossLaw = _choice("free-space", "path loss", "Eq. 1", PathLossLaw, group=CHANNEL)
+    loss_exponent: float = _radio(3.0, "path loss exponent", "1", 1.0, 10.0)
+    reference_m: float = _radio(20.0, "reference distance", "m", 0.1, 10_000.0)
+    antenna_height_m: float = _radio(1.0, "antenna height", "m", 0.1, 100.0)
+    shadowing_db: float = _radio(0.0, "shadowing", "dB", 0.0, 30.0)
+    shadowing_distance_m: float = _radio(20.0, "shadowing distance", "m", 0.1, 10_000.0)
+    fading: FadingLaw = _choice("none", "fading", NEW, FadingLaw, group=CHANNEL)
+    rician_k: float = _radio(4.0, "Rician K", "1", 0.0, 10_000.0)
+    erasure: float = _radio(0.0, "erasure probability", "1", 0.0, 0.99)
+    burst_begin: float = _radio(0.0, "burst begin", "per slot", 0.0, 0.5)
+    burst_end: float = _radio(0.05, "burst end", "per slot", 0.001, 0.5)
+    high_power_fraction: float = _radio(0.0, "high-power fraction", "of the team", 0.0, 1.0)
+    high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0)
+    clock_offset_s: float = _radio(0.0, "clock offset", "s", 0.0, 10.0, may_lack=True)
+    clock_drift_ppm: float = _radio(0.0, "clock drift", "ppm", 0.0, 10_000.0, may_lack=True)
     prior_knowledge: str = _choice(
-        NOTHING,
-        "prior knowledge",
-        NEW,
-        Knowable,
-        "what robots know before the mission, several joined by commas",
-        group=CHANNEL,
-        is_joined=True,
-        convert=in_order,
+        NOTHING, "prior knowledge", NEW, Knowable, group=CHANNEL, is_joined=True, convert=in_order
     )
-    map_offset_m: float = _radio(
-        0.0, "map offset", "m", 0.0, 1e4, "how far east robots' map is of the truth", may_lack=True
-    )
-    bit_rate: float | None = _radio(
-        None,
-        "bit rate",
-        "bit/s",
-        1.0,
-        1e12,
-        "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
-        metavar="RATE",
-    )
+    map_offset_m: float = _radio(0.0, "map offset", "m", 0.0, 1e4, may_lack=True)
+    bit_rate: float | None = _radio(None, "bit rate", "bit/s", 1.0, 1e12, metavar="RATE")
 
-    physics: PhysicsMode = _choice(
-        "exact", "physics", "Eq. 15", PhysicsMode, "Eq. 15, or forces, as obstacles need"
-    )
-    collide: bool = setting(
-        False, "robots bounce off each other, too, in contact physics", label="robots collide"
-    )
-    boundary: Boundary = _choice(
-        "reflect", "boundary", "IV-A", Boundary, "at the area's edge; reflect among obstacles"
-    )
+    physics: PhysicsMode = _choice("exact", "physics", "Eq. 15", PhysicsMode)
+    collide: bool = _named("robots collide", False)
+    boundary: Boundary = _choice("reflect", "boundary", "IV-A", Boundary)
     wall_hit: WallHit = _choice("mirror", "wall hit", "IV-A; the code clips", WallHit)
     half_duplex: HalfDuplex = _choice("strict", "half duplex", "Eq. 3", HalfDuplex)
     flocking_set: FlockingSet = _choice("heard", "flocking set F", "Eq. 16", FlockingSet)
