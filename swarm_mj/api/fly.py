@@ -77,7 +77,9 @@ def fly(
     """Fly one mission, from the first window to the last.
 
     The same arguments give the same numbers as `swarm-mj fly` does. On a terminal, a bar shows how
-    far it is. Ctrl-C ends the flight after a whole window and keeps what was flown.
+    far it is. Ctrl-C ends the flight after a whole window and keeps what was flown; before the
+    first window it raises KeyboardInterrupt. Raises ValueError if a value is unknown or out of
+    range, or memory does not suffice; TypeError if an argument is of the wrong kind, or unknown.
 
     Args:
         task: The robots' task by name, or a `Mission`. None is "flocking", and "random-walk" in the
@@ -94,11 +96,6 @@ def fly(
         scene: A function that adds obstacles to the arena, likewise; none unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
         **mission_fields: Any field of `Mission`, such as `num_robots=20` or `preset="reference"`.
-
-    Raises:
-        ValueError: A value is unknown or out of range, or memory does not suffice.
-        TypeError: An argument is of the wrong kind, or has a name that is not known.
-        KeyboardInterrupt: Ctrl-C was pressed before the first window was flown.
     """
     mission = mission_of(fly, task, mission_fields)
     how = {"probability": probability, "is_deterministic": is_deterministic}

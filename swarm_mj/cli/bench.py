@@ -1,5 +1,6 @@
 """`swarm-mj bench`: how fast the simulation and its parts are on this machine."""
 
+import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -16,14 +17,7 @@ from swarm_mj.system.writing import Output, check_outputs
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 BUSY = 0.3  # the spread from which on numbers say little
-LEGEND = """\
-window: 100 ms of a mission. The indented rows below the line are its parts.
-plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
-arena blocks: costs most in MuJoCo, which looks for contacts in each of its ten steps a window.
-planner: most of its time goes into plans, once in half as many windows as there are robots.
-team decision: the network decides for all robots of a team, in one window.
-process: its largest memory. team: its memory beyond that of a team of three robots, and below it
-what `fly` estimates."""
+LEGEND: str = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["legend"]
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -4,6 +4,7 @@ import json
 import os
 import platform
 import sys
+import tomllib
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import metadata
@@ -30,23 +31,8 @@ State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 PACKAGE = "swarm_mj"
 MAX_LETTERS = 400  # of what a trial complains, cut between words
-RENDERING = {  # by MuJoCo's back ends, and how to get each
-    "egl": "needs a graphics driver with EGL; or use osmesa",
-    "osmesa": "Debian and Ubuntu: apt-get install libosmesa6",
-    "glfw": "needs a display; else use egl or osmesa",
-}
-
-# Programs that end with 0 if a thing works.
-RENDER = """
-import mujoco
-with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 32, 32) as renderer:
-    renderer.render()
-"""
-FLIGHT = """
-from swarm_mj.cli import main
-raise SystemExit(main("fly --task stationary --policy tdma --robots 3 --windows 5 --range-ratio 10 "
-                      "--no-record".split()))
-"""
+_TRIALS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+RENDERING: dict[str, str] = _TRIALS["rendering"]  # by MuJoCo's back ends, and how to get each
 
 
 class Finding(NamedTuple):
@@ -117,12 +103,12 @@ def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
 def tried() -> Iterator[Finding]:
     """Fly, and render by each back end, to find what works."""
     mend = "see what `swarm-mj fly` says"
-    yield _of_trial(Finding("flying", "three robots fly", "broken", mend=mend), FLIGHT)
+    yield _of_trial(Finding("flying", "three robots fly", "broken", mend=mend), _TRIALS["flight"])
     for name, mend in RENDERING.items():
         group = "rendering without a display"
         failed = Finding(group, f"MUJOCO_GL={name}", "absent", mend=mend)
         # What else is set for PyOpenGL would bind all of them to one back end.
-        yield _of_trial(failed, RENDER, {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name})
+        yield _of_trial(failed, _TRIALS["render"], {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name})
 
 
 def _of_trial(failed: Finding, program: str, variables: Mapping[str, str] | None = None) -> Finding:

@@ -12,14 +12,14 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.fly import flight_needs, fly_mission
+from swarm_mj.cli import EPILOGS
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.replay.view import has_display, view_command
-from swarm_mj.replay.view import run as run_viewer
+from swarm_mj.replay import view
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import common_setting
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -37,10 +37,7 @@ LARGE = 80  # robots, beyond which a plan takes long, and age-gain-csma has the 
 class FlyOptions(PolicyOptions):
     """The options of `swarm-mj fly`."""
 
-    EPILOG: ClassVar = (
-        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (what was flown is "
-        "recorded)."
-    )
+    EPILOG: ClassVar = EPILOGS["fly"]
     policy: str = common_setting(
         "planner", f"{NAMES}, a directory with a learned policy, or module:Name of your own"
     )
@@ -95,7 +92,7 @@ def run(options: FlyOptions) -> int:
     if flown.ending:
         console.print(f"{flown.ending}.")
         return flown.code
-    return run_viewer(view_command(path)) if options.view and path else DONE
+    return view.run(view.view_command(path)) if options.view and path else DONE
 
 
 def _check_machine(options: FlyOptions, path: Path | None) -> None:
@@ -109,7 +106,7 @@ def _check_machine(options: FlyOptions, path: Path | None) -> None:
 
 def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str, str]]:
     """Yield what to do next, and the commands that do it."""
-    name, way = this_command(), "" if has_display() else "--web "
+    name, way = this_command(), "" if view.has_display() else "--web "
     if path:
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
     yield "Other policies:", f"{name} policies"
@@ -145,7 +142,7 @@ def _replay_path(options: FlyOptions) -> Path | None:
         must_be_new=not options.force,
     )
     if options.view and path:
-        view_command(path)  # complains now if there is no display
+        view.view_command(path)  # complains now if there is no display
     return path
 
 

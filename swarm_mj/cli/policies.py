@@ -4,7 +4,9 @@ import inspect
 import json
 import shlex
 import sys
+import tomllib
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, ClassVar
 
 from rich.box import SIMPLE_HEAD
@@ -21,15 +23,8 @@ from swarm_mj.system.fields import as_typed, common_setting, setting
 from swarm_mj.system.packages import is_installed, missing
 from swarm_mj.system.terminal import named_values, plain_console, this_command
 
-WINDOWS = {
-    "broadcasts": "two broadcasts, which nobody answers",
-    "request": "a request to a teammate, which answers",
-}
-CARRIED = {
-    "T, M, P": "when each teammate was seen, its state, and who passed that on",
-    "snapshots": "two pictures of the whole team, on which robots agree to plan alike",
-    "links": "how often robots decoded and missed each other, and what that says of the channel",
-}
+_WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+CARRIED: dict[str, str] = _WORDS["carried"]
 HEADINGS = {False: "each robot decides by itself", True: "a centre decides"}
 
 
@@ -116,7 +111,7 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
-        "in a window": WINDOWS[each["window"]],
+        "in a window": _WORDS["windows"][each["window"]],
         "packets carry": "\n".join(carried),
         "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},

@@ -48,10 +48,7 @@ def setting_options() -> Iterator[Field[Any]]:
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
     """Return the settings that were given, by their places; a value of several counts once."""
     values = {place: given[place] for place in SPECS if place in given}
-    for place, value in values.items():
-        if isinstance(value, tuple):
-            values[place] = tuple(dict.fromkeys(value))
-    return values
+    return {at: tuple(dict.fromkeys(x)) if isinstance(x, tuple) else x for at, x in values.items()}
 
 
 def asked_settings(
@@ -122,12 +119,8 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
     """Return the settings given of one part, by their names in it."""
-    found = {}
-    for place, value in given.items():
-        owner, _, name = place.rpartition(".")
-        if owner == part:
-            found[name] = value
-    return found
+    parted = ((place.rpartition("."), value) for place, value in given.items())
+    return {name: value for (owner, _, name), value in parted if owner == part}
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:

@@ -35,10 +35,8 @@ def credits_of(
     """Return the age that the team would not have lost in a window without each robot.
 
     T is that at the end of the window before, `now` the start of this one [windows]. The channel is
-    a `snapshot_channel` from before the window. Active robots, or all, count.
-
-    Returns:
-        The credit of every robot, summed over pairs of robots [windows]; it may be negative.
+    a `snapshot_channel` from before the window. Active robots, or all, count. A credit is
+    summed over pairs of robots [windows], and may be negative.
     """
     if is_active is not None:
         recipient = recipient.copy()

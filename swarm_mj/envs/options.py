@@ -42,6 +42,9 @@ def make_batch(
 ) -> MissionBatch:
     """Return missions that have not begun, by the options that all environments share.
 
+    Raises ValueError if a value is unknown or out of range, or does not go with another; TypeError
+    if a field is not one of `Mission`'s, the features are no name, or a component is not callable.
+
     Args:
         mission: The mission, or its task.
         num_missions: B.
@@ -57,11 +60,6 @@ def make_batch(
         controller: Likewise.
         scene: Likewise.
         **fields: Any other field of `Mission`.
-
-    Raises:
-        ValueError: A value is unknown or out of range, or does not go with another.
-        TypeError: A field is not one of `Mission`'s, the features are no name, or a component
-            cannot be called.
     """
     if not isinstance(num_missions, Integral) or num_missions < 1:
         raise ValueError(f"the number of missions must be 1 or more, not {num_missions!r}")

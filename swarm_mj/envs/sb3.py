@@ -36,6 +36,8 @@ def make_vec_env(
 ) -> SwarmVecEnv:
     """Return B missions for stable-baselines3, with `action_masks()` for `MaskablePPO`.
 
+    Raises ValueError if a value is unknown or out of range, TypeError if an option is unknown.
+
     Args:
         mission: The mission, or its task.
         num_missions: B.
@@ -45,10 +47,6 @@ def make_vec_env(
             these; None draws the first ones, too. A model with a `seed` of its own begins with
             that mission instead: stable-baselines3 seeds its environment with it.
         **options: As of `make_batch`: the reward, the features, and any field of `Mission`.
-
-    Raises:
-        ValueError: A value is unknown or out of range.
-        TypeError: An option is unknown.
     """
     check_choice("agent", agent, AGENTS)
     for name in {"n_envs", "num_envs"} & options.keys():
@@ -72,11 +70,8 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
 
     The model is PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
     of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its rewards. A
-    model that was loaded needs it again: `PPO.load(path, env=env)`.
-
-    Raises:
-        ValueError: The model is another.
-        OSError: The file cannot be written.
+    model that was loaded needs it again: `PPO.load(path, env=env)`. Raises ValueError if the model
+    is another, and OSError if the file cannot be written.
     """
     batch = _trained_on(model)
     layers = _actor(model)

@@ -10,22 +10,10 @@ from typing import Any
 from swarm_mj.mission.specification import NOTHING, OPEN, Mission, Task
 from swarm_mj.system.fields import as_typed
 
-# The channel's effects beyond free space, unless they are one of `OFF`; and the numbers that count
-# only where an effect is on, or, if a value is named, where it is that.
-EFFECTS = (
-    "path_loss", "shadowing_db", "fading", "erasure", "burst_begin", "high_power_fraction",
-    "clock_offset_s", "clock_drift_ppm",
-)  # fmt: skip
-OFF = ("free-space", "none", 0)
-NEEDED: dict[str, tuple[str, str | None]] = {
-    "loss_exponent": ("path_loss", "log-distance"),
-    "reference_m": ("path_loss", "log-distance"),
-    "antenna_height_m": ("path_loss", "two-ray"),
-    "shadowing_distance_m": ("shadowing_db", None),
-    "rician_k": ("fading", "rician"),
-    "burst_end": ("burst_begin", None),
-    "high_power_db": ("high_power_fraction", None),
-    "map_offset_m": ("prior_knowledge", "map"),
+_NUMBERS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
+OFF = ("free-space", "none", 0)  # of the channel's effects
+NEEDED = {  # the effect that a number counts with; a state of it, if only that
+    number: (effect, state or None) for number, (effect, state) in _NUMBERS["needed"].items()
 }
 
 
@@ -48,17 +36,7 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
 
 def reference(task: Task = "flocking", **overrides: Any) -> Mission:
     """Return the setting of the authors' published code and numbers; arguments as of `paper`."""
-    code: dict[str, Any] = {
-        "preset": "reference",
-        "max_acceleration_mps2": 10.0,
-        "wall_hit": "clip",
-        "half_duplex": "eavesdroppers",
-        "flocking_set": "moving",
-        "silence_is_attempt": True,
-        "moves_each_transmission": True,
-        "tree_recomputed": task != "stationary",
-        "tree_root_transmits": True,
-    }
+    code = _NUMBERS["reference"] | {"tree_recomputed": task != "stationary"}
     return paper(task, **(code | overrides))
 
 
@@ -80,7 +58,7 @@ PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
 def beyond_free_space(mission: Mission) -> str:
     """Return the channel's differences from the paper's, in words; empty for free space."""
     named: list[str] = []
-    for effect in EFFECTS:
+    for effect in _NUMBERS["effects"]:
         # A fraction that rounds to no robot is no effect.
         name = "num_high_power" if effect == "high_power_fraction" else effect
         if (state := getattr(mission, name)) not in OFF:

@@ -101,11 +101,8 @@ class Physics:
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
         self._batch.step()
         shape = acceleration_mps2.shape
-        states = self.states = RobotStates(
-            position_m=np.empty(shape),
-            velocity_mps=np.empty(shape),
-            is_active=self.states.is_active,
-        )
+        fresh = {"position_m": np.empty(shape), "velocity_mps": np.empty(shape)}
+        states = self.states = replace(self.states, **fresh)
         mission = self._mission
         _kick(
             self._qpos,
