@@ -38,7 +38,7 @@ CUT_SHORT = {
     "train": "--budget 40 --robots 5 --windows 10 --held-out 1",
     "train --resume": "--budget 80",
 }
-ONLY_PARSED = "--minutes 30"  # the page trains a shorter while before
+ONLY_PARSED = re.compile("--minutes 30|study run impairments")  # the page trains less before
 # A block that is a file says so in line 1.
 FILE = re.compile(r"^(?:# (?P<program>[a-z_]+\.py)|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
 
@@ -113,7 +113,7 @@ def run_command(line, folder, forks):
     program, *arguments = shlex.split(line, comments=True)
     if program == "cp":
         shutil.copy(*arguments)
-    if program != "swarm-mj" or ONLY_PARSED in line:
+    if program != "swarm-mj" or ONLY_PARSED.search(line):
         return
     kind = "train --resume" if "--resume" in arguments else arguments[0]
     found = [sorted(map(str, Path().glob(each))) if "*" in each else [each] for each in arguments]
@@ -125,7 +125,7 @@ def run_command(line, folder, forks):
 def test_blocks_that_are_not_run_say_why():
     assert {block.language for block in BLOCKS} <= LANGUAGES
     unrun = (block for block in BLOCKS if block.reason)
-    assert all(re.search(REASONS[block.reason], block.code) for block in unrun)
+    assert all(re.search(REASONS[str(block.reason)], block.code) for block in unrun)
 
 
 @pytest.mark.parametrize("line", sorted({line for _, line in LINES}))

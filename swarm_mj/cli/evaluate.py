@@ -33,21 +33,14 @@ from swarm_mj.system.writing import Output, check_outputs, owned
 
 
 @dataclass(frozen=True, kw_only=True)
-class EvaluateOptions(PolicyOptions):
-    """The options of `swarm-mj evaluate`."""
+class StudyFlags:
+    """How a study is flown, and where its results go."""
 
     EPILOG: ClassVar = (
         "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json or "
         "--csv, --resume continues)."
     )
-    policy: tuple[str, ...] = setting(
-        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", is_common=True
-    )
-    episodes: int = same_as(Study, "episodes")
-    seed: int = same_as(Study, "seed")
-    baseline: str | None = same_as(Study, "baseline")
     jobs: int = same_as(Processes, "jobs")
-    missions: tuple[Mission, ...] = several_missions()
     json: Path | None = output_option(
         None, "write all figures and each mission's costs", metavar="FILE.json", is_common=True
     )
@@ -69,6 +62,19 @@ class EvaluateOptions(PolicyOptions):
     yes: bool = output_option(False, YES)
     resume: bool = output_option(False, "continue where an interruption broke off")
 
+
+@dataclass(frozen=True, kw_only=True)
+class EvaluateOptions(StudyFlags, PolicyOptions):
+    """The options of `swarm-mj evaluate`."""
+
+    policy: tuple[str, ...] = setting(
+        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", is_common=True
+    )
+    episodes: int = same_as(Study, "episodes")
+    seed: int = same_as(Study, "seed")
+    baseline: str | None = same_as(Study, "baseline")
+    missions: tuple[Mission, ...] = several_missions()
+
     @property
     def study(self) -> Study:
         """The study that the options name; raises ValueError as it does."""
@@ -87,13 +93,17 @@ class EvaluateOptions(PolicyOptions):
 
 def run(options: EvaluateOptions) -> int:
     """Run the command; return its exit code."""
+    return fly(options, options.study)
+
+
+def fly(options: StudyFlags, study: Study) -> int:
+    """Fly a study as asked, and write its results; return the exit code."""
     need("scipy", "an evaluation")
-    study = options.study
     outputs = Output("--json", options.json, ".json"), Output("--csv", options.csv, ".csv")
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
     if options.plot:
         need("matplotlib", "a chart")
-    inputs = registry.stored_policies(options.policy)
+    inputs = registry.stored_policies(study.policies)
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
     needs = study_needs(study, options.jobs)
@@ -104,7 +114,7 @@ def run(options: EvaluateOptions) -> int:
         return _evaluate(options, study, _progress_file(options, outputs))
 
 
-def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
+def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     """Fly the rest of a study, and write its results; `kept` is the progress file."""
     tell_cores(options.jobs)
     console = Console(stderr=True, highlight=False)
@@ -145,7 +155,7 @@ def _evaluate(options: EvaluateOptions, study: Study, kept: Path | None) -> int:
     return DONE
 
 
-def _progress_file(options: EvaluateOptions, outputs: Iterable[Output]) -> Path | None:
+def _progress_file(options: StudyFlags, outputs: Iterable[Output]) -> Path | None:
     """Return the progress file, or None without outputs; raise ValueError if it is in the way."""
     output = options.json or options.csv
     if output is None:

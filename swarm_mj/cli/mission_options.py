@@ -1,7 +1,7 @@
 """Options that several commands share: those that make missions, and those of policies."""
 
 import shlex
-from collections.abc import Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from functools import partial
 from itertools import product
@@ -22,6 +22,7 @@ TUNED = "tuned for the regime"
 # What most people set: `--help` shows these, and `--help-all` the others, too.
 COMMON = ("preset", "task", "num_robots", "range_ratio", "num_windows", "arena")
 SPECS = [spec for spec in fields(Mission) if "help" in spec.metadata]
+FLAGS = {spec.name: flags_of(spec)[0] for spec in SPECS}
 USUAL = paper("flocking"), paper("stationary")  # whose defaults are shown
 
 
@@ -66,10 +67,12 @@ def several_missions() -> FieldOf:
     return nested(partial(_mission_options, is_many=True), missions_of)
 
 
-def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
-    """Return the missions that options name, by `mission.` and the field's name; a list sweeps."""
+def missions_of(
+    given: dict[str, Any], called: Callable[[str], str] = FLAGS.__getitem__
+) -> tuple[Mission, ...]:
+    """Return the missions of fields given, as `mission.NAME`; a tuple of values is swept."""
     swept: dict[str, Iterable[Any]] = {}
-    for spec in SPECS:
+    for spec in fields(Mission):
         place = f"mission.{spec.name}"
         if place in given:
             value = given[place]
@@ -77,23 +80,24 @@ def missions_of(given: dict[str, Any]) -> tuple[Mission, ...]:
     missions = [
         make_mission(**dict(zip(swept, values, strict=True))) for values in product(*swept.values())
     ]
-    check_in_use(swept, missions)
+    check_in_use(swept, missions, called)
     # A fraction that rounds to no robot makes the missions of 0, which are flown once.
     made = (m if m.num_high_power else replace(m, high_power_fraction=0.0) for m in missions)
     return tuple(dict.fromkeys(made))
 
 
-def check_in_use(given: Collection[str], missions: Sequence[Mission]) -> None:
+def check_in_use(
+    given: Collection[str], missions: Sequence[Mission], called: Callable[[str], str]
+) -> None:
     """Raise ValueError for a field given that counts in no mission: another must switch it on."""
-    flags = {spec.name: flags_of(spec)[0] for spec in SPECS}
     for name, (switch, value) in NEEDED.items():
         states = [getattr(mission, switch) for mission in missions]
         is_on = (value in s.split(",") if value else s > 0.0 for s in states)
         if name in given and not any(is_on):
             shown = value or "above 0"
             raise ValueError(
-                f"{flags[name]} counts only with {flags[switch]} {shown}; give that too, or leave "
-                f"{flags[name]} out"
+                f"{called(name)} counts only with {called(switch)} {shown}; give that too, or "
+                f"leave {called(name)} out"
             )
 
 

@@ -10,7 +10,7 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.mission_options import COMMON, check_in_use
+from swarm_mj.cli.mission_options import COMMON, FLAGS, check_in_use
 from swarm_mj.cli.options import flags_of, nested_option
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
@@ -63,7 +63,7 @@ def asked_settings(
     asked = _part("mission", given)
     sizes = own.get("robots", (Mission().num_robots,))
     mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
-    check_in_use(asked, [mission])
+    check_in_use(asked, [mission], FLAGS.__getitem__)
     training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
     if init is not None:
         same = {name: getattr(init, name) for name in ("network", "features", "silence_logit")}

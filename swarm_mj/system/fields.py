@@ -69,17 +69,20 @@ def check(settings: Settings) -> None:
     """Raise ValueError unless every field's value is of its kind and in its range or choices.
 
     The message names the field, what is allowed, and the value. NumPy's numbers, which JSON does
-    not know, become Python's.
+    not know, become Python's, and whole numbers floats where those are meant.
     """
     for spec in fields(settings):
         value = getattr(settings, spec.name)
         if value is None and NoneType in get_args(spec.type):
             continue
-        given = value if isinstance(value, tuple) else (value,)
+        has_many = get_origin(spec.type) is tuple
+        given: tuple[Any, ...] = value if has_many and isinstance(value, tuple) else (value,)
         for each in given:
             check_value(spec, each)
         plain = tuple(each.item() if isinstance(each, np.generic) else each for each in given)
-        object.__setattr__(settings, spec.name, plain if isinstance(value, tuple) else plain[0])
+        if kind_of(spec) is float:
+            plain = tuple(map(float, plain))
+        object.__setattr__(settings, spec.name, plain if has_many else plain[0])
 
 
 def kind_of(spec: Field[Any]) -> object:

@@ -1,0 +1,151 @@
+"""`swarm-mj study`: files that are studies."""
+
+import json
+
+import pytest
+
+from swarm_mj.cli import parse
+from swarm_mj.cli.study import read_study
+from swarm_mj.mission import paper, reference
+from swarm_mj.policies.registry import POLICIES
+from swarm_mj.system.packages import asset
+
+SMALL = "[study]\npolicies = ['mst', 'round-robin']\nepisodes = 2\n"
+MISSION = "[mission]\nnum_robots = 5\nnum_windows = 12\nrange_ratio = 1\n"
+OPTIONS = "--policy mst round-robin --episodes 2 --robots 5 --windows 12 --range-ratio 1"
+
+
+@pytest.fixture
+def read(tmp_path):
+    """Reads a study from its text."""
+
+    def reading(text):
+        (tmp_path / "s.toml").write_text(text)
+        return read_study(str(tmp_path / "s.toml"))
+
+    return reading
+
+
+@pytest.mark.parametrize(
+    ("text", "options"),
+    [
+        ("", ""),
+        ("bit_rate = 250e3\n", "--bit-rate 250k"),
+        ("task = ['stationary', 'random-walk']\nerasure = [0, 0.1]\n",
+         "--task stationary random-walk --erasure 0 0.1"),
+        ("task = 'random-walk'\npreset = 'reference'\n", "--task random-walk --preset reference"),
+        ("preset = 'urban'\nrician_k = 3\n", "--preset urban --rician-k 3"),
+    ],
+)  # fmt: skip
+def test_a_file_is_the_study_of_the_same_options(read, text, options):
+    typed = f"{OPTIONS} {options}"
+    from_options = parse(["evaluate", *typed.split()])[1].study
+    from_file = read(SMALL + MISSION + text)
+    assert from_file == from_options
+    assert json.dumps(from_file.header()) == json.dumps(from_options.header())
+
+
+def test_results_are_byte_for_byte_those_of_the_same_options(succeed, tmp_path):
+    (tmp_path / "s.toml").write_text(SMALL + MISSION + "erasure = [0.1, 0.3]\n")
+    ran = succeed("study", "run", "s.toml", "--csv", "run.csv", "--json", "run.json")
+    evaluated = succeed(
+        "evaluate",
+        *OPTIONS.split(),
+        "--erasure",
+        0.1,
+        0.3,
+        "--csv",
+        "e.csv",
+        "--json",
+        "e.json",
+    )
+    assert ran.stdout == evaluated.stdout
+    for ending in ("csv", "json"):
+        assert (tmp_path / f"run.{ending}").read_bytes() == (tmp_path / f"e.{ending}").read_bytes()
+
+
+def test_an_empty_file_is_the_default_evaluation(read):
+    assert read("") == parse(["evaluate"])[1].study
+
+
+def test_tables_of_missions_follow_each_other_and_override_what_they_share(read):
+    study = read(
+        "[mission]\ntask = 'stationary'\nnum_robots = [5, 6]\n"
+        "[missions.none]\n[missions.loss]\nerasure = 0.1\nnum_robots = 7\n[missions.again]\n"
+    )
+    assert study.regimes == (
+        paper("stationary", num_robots=5),
+        paper("stationary", num_robots=6),
+        paper("stationary", num_robots=7, erasure=0.1),
+    )
+
+
+def test_fields_that_are_no_options_can_be_set_and_swept(read):
+    regimes = read("[mission]\npreset = 'reference'\nmax_acceleration_mps2 = [5, 10]\n").regimes
+    assert regimes == tuple(reference(max_acceleration_mps2=x) for x in (5.0, 10.0))
+
+
+def test_all_is_every_policy(read):
+    assert read("[study]\npolicies = 'all'\n").policies == tuple(POLICIES)
+
+
+REFUSED = {
+    "[mission]\nrobots = 5": "[mission] got an unexpected keyword argument 'robots'; "
+    "did you mean num_robots?",
+    "[missions.a]\nerasur = 0.1": "[missions.a] got an unexpected keyword argument 'erasur'; "
+    "did you mean erasure?",
+    "[studi]": "did you mean study?",
+    "[study]\nepisode = 3": "did you mean episodes?",
+    "[study]\nepisodes = [3, 4]": "episodes must be a whole number from 1 to 100000, not (3, 4)",
+    "[study]\nbaseline = 'mst'\npolicies = ['tdma']": "add it to them",
+    "[study]\npolicies = ['tdm']": "did you mean tdma?",
+    "[missions.a]\nnum_robots = [5, 1]": "[missions.a]: number of robots must be a whole number "
+    "from 2 to 10000 [robots], not 1",
+    "[mission]\ntask = 'flok'": "not 'flok'; did you mean flocking?",
+    "[mission]\nnum_robots = '5'": "number of robots must be a whole number",
+    "[mission]\nburst_end = 0.1": "burst_end counts only with burst_begin above 0; give that too, "
+    "or leave burst_end out",
+    "mission = 3": "[mission] must be of the type dict",
+    "[missions]": "at least 1 policy and 1 regime",
+    "[mission": "study s.toml: Expected ']'",
+}
+
+
+@pytest.mark.parametrize("text", REFUSED)
+def test_what_no_study_may_say_is_refused_in_a_line_that_names_the_file(refusal, tmp_path, text):
+    (tmp_path / "s.toml").write_text(text)
+    line = refusal("study", "run", "s.toml")
+    assert line.startswith("swarm-mj: error: study s.toml: ")
+    assert REFUSED[text] in line
+
+
+@pytest.mark.parametrize(
+    ("line", "complaint"),
+    [
+        ("run nowhere.toml", "study nowhere.toml cannot be found"),
+        ("run impairment", "not impairment; did you mean impairments?"),
+        ("run r.json", "impairments-small"),
+        ("fly s.toml", "action must be one of run, not 'fly'"),
+    ],
+)
+def test_other_slips_are_refused(refusal, line, complaint):
+    assert complaint in refusal("study", *line.split())
+
+
+@pytest.mark.parametrize(
+    "path", sorted(asset("studies").glob("*.toml")), ids=lambda path: path.stem
+)
+def test_shipped_studies_can_be_flown(path):
+    """Making one makes every policy in every regime."""
+    study = read_study(path.stem)
+    assert {each.task for each in study.regimes} == {"stationary", "random-walk", "flocking"}
+    assert len(study.regimes) % 3 == 0
+
+
+def test_the_small_study_has_the_impairments_of_the_full_one():
+    def varied(name):
+        regimes = [vars(each) for each in read_study(name).regimes]
+        return {field for field in regimes[0] if len({each[field] for each in regimes}) > 1}
+
+    assert varied("impairments-small") == varied("impairments")
+    assert "clock_offset_s" in varied("impairments-small")
