@@ -1,8 +1,10 @@
 """Results on the terminal: one table per regime, the lowest age first."""
 
 import io
+import tomllib
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
+from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
@@ -18,6 +20,7 @@ from swarm_mj.protocol.packets import BITS_PER_BYTE
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the table
 NONE = "-"
+LEGEND = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 
 
 def results_text(results: Sequence[Result]) -> str:
@@ -188,32 +191,15 @@ def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
 
 def _legend(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
     """Yield the meanings of the columns, a sentence each."""
-    yield (
-        "AoI: age of information, how old a robot's news of another is [windows]; mean over the "
-        "missions,"
-    )
-    if is_wide:
-        yield (
-            "standard error and 95 % interval. Median and p95 are over missions. "
-            f"Difference: AoI minus that of {results[0].baseline}, mission by mission. "
-            "Packets: sent in a window, and the share that reached its addressee or, of "
-            "broadcasts, at least one robot; hearers: robots that decoded a broadcast, on average. "
-            "Bytes: of a packet."
-        )
-    else:
-        yield (
-            "with its standard error. Differences are mission by mission, with 95 % intervals. "
-            "Heard: packets that reached their addressee or, of broadcasts, at least one robot."
-        )
+    yield LEGEND["age"]
+    yield LEGEND["wide" if is_wide else "brief"].format(results[0].baseline)
     costs = [f"{r.task_cost_name} [{r.task_cost_unit}]" for r in results if _has_own_cost(r)]
-    for cost in dict.fromkeys(costs):
-        yield f"Task cost: {cost}, mean over windows ± standard error over missions."
+    yield from (LEGEND["task_cost"].format(cost) for cost in dict.fromkeys(costs))
     if is_wide and any(result.task == "flocking" for result in results):
-        yield "Velocity variance (var.): of the robots' velocities [m²/s²]."
+        yield LEGEND["velocity_variance"]
     if is_wide and any(result.published_aoi_mean is not None for result in results):
-        yield "Published: by the paper."
+        yield LEGEND["published"]
     if any(_number(result.aoi_floor_mean) not in (NONE, "0.00") for result in results):
-        yield "Lower bound: the AoI if all robots with a path between them shared everything at"
-        yield "once."
+        yield LEGEND["lower_bound"]
     if any(map(carries_more, results)):
-        yield f"+: packets {CARRIES_MORE}, which the paper's carry."
+        yield LEGEND["payload"].format(CARRIES_MORE)

@@ -63,17 +63,9 @@ RULES: dict[str, Callable[..., Policy]] = {
     WITHOUT_PAYLOAD: RestingPlanner,
     "greedy-oracle": GreedyOracle,
 }
-# Of policies that take more than a few bytes themselves for each pair of robots: the round of N
-# windows from which they do, these bytes, and those for each robot and pair, where teams move.
-PAIR_BYTES = {
-    "csma": (0.0, 25.0, 0.0),
-    "age-gain-csma": (0.0, 25.0, 0.0),
-    "sotdma": (1.5, 230.0, 0.0),
-    "planner": (1.0, 250.0, 4.0),  # a plan by each of the snapshots that are still flown by
-    "greedy-oracle": (0.0, 60.0, 0.0),
-}
 SHIPPED = "gnn"  # in assets/policies/
-USES = tomllib.loads(Path(__file__).with_name("uses.toml").read_text("utf-8"))
+_SAID = tomllib.loads(Path(__file__).with_name("uses.toml").read_text("utf-8"))
+USES, PAIR_BYTES = _SAID["uses"], _SAID["pair_bytes"]
 POLICIES = (*RULES, SHIPPED)
 
 

@@ -84,27 +84,13 @@ class SpatialTdma(Tdma):
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         knows_all = np.all(buffers.is_known | is_oneself, axis=2)
         is_sending = knows_all.copy()
-        keep_joined(
-            buffers.position_m,
-            self._order,
-            slot,
-            self._range_m,
-            self._threshold,
-            is_sending,
-            self._powers,
-        )
+        limits = self._range_m, self._threshold
+        keep_joined(buffers.position_m, self._order, slot, *limits, is_sending, self._powers)
         if self._contends:
-            wins = winners(
-                buffers.timestamp,
-                buffers.position_m,
-                views.phases[-1].heard if views.phases else views.silence,
-                self._draws.next(),
-                self._range_m,
-                self._num_expected,
-                self._noted_at,
-                self._news,
-            )
-            is_sending |= wins & ~knows_all
+            heard = views.phases[-1].heard if views.phases else views.silence
+            seen = buffers.timestamp, buffers.position_m, heard, self._draws.next()
+            news = self._range_m, self._num_expected, self._noted_at, self._news
+            is_sending |= winners(*seen, *news) & ~knows_all
             self._news[is_sending[:, :, None] & is_oneself] = 0.0
         return is_sending
 

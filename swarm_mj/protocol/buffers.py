@@ -71,15 +71,8 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
     """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
-    write_own(
-        buffers.timestamp,
-        buffers.position_m,
-        buffers.velocity_mps,
-        states.position_m,
-        states.velocity_mps,
-        now,
-        states.is_active,
-    )
+    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps
+    write_own(*known, states.position_m, states.velocity_mps, now, states.is_active)
 
 
 def record_attempt(
@@ -111,14 +104,8 @@ def merge(
     is in the packet, and otherwise names the sender: so buffers remain trees, although some robots
     on the way are left out.
     """
-    merge_newer(
-        buffers.timestamp if sent is None else sent,
-        heard,
-        buffers.timestamp,
-        buffers.position_m,
-        buffers.velocity_mps,
-        buffers.parent,
-    )
+    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent
+    merge_newer(buffers.timestamp if sent is None else sent, heard, *known)
 
 
 @compiled()

@@ -30,23 +30,9 @@ def talk(
     """
     said = np.empty((num_slots, 2, *recipient.shape), dtype=np.int64)
     said[0, 0] = recipient  # in the one type and layout that the loops are compiled for
-    _talk(
-        buffers.timestamp,
-        buffers.position_m,
-        buffers.velocity_mps,
-        buffers.parent,
-        buffers.last_attempt,
-        states.position_m,
-        states.velocity_mps,
-        states.is_active,
-        now,
-        silence_is_attempt,
-        radio.received_at_1_m_mw,
-        radio.noise_mw,
-        radio.threshold,
-        radio.recipient_hears_while_sending,
-        said,
-    )
+    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent
+    truth = states.position_m, states.velocity_mps, states.is_active
+    _talk(*known, buffers.last_attempt, *truth, now, silence_is_attempt, *radio.rule, said)
     return said
 
 

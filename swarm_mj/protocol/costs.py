@@ -137,22 +137,10 @@ def window_costs(
     """Return all costs of one window for the active robots; arguments as above."""
     first, second = phases
     age, is_complete = np.empty(len(now)), buffers.is_granted.copy()
-    variance, counts = np.empty(len(now)), np.zeros((2, 5, len(now)))
-    _measure(
-        buffers.timestamp,
-        now,
-        states.velocity_mps,
-        states.is_active,
-        first.recipient,
-        first.heard,
-        second.recipient,
-        second.heard,
-        age,
-        is_complete,
-        variance,
-        counts,
-    )
-    return WindowCosts(age, is_complete, variance, counts, is_broadcast, task_cost)
+    costs = age, is_complete, np.empty(len(now)), np.zeros((2, 5, len(now)))
+    flown = buffers.timestamp, now, states.velocity_mps, states.is_active
+    _measure(*flown, *first, *second, *costs)
+    return WindowCosts(*costs, is_broadcast, task_cost)
 
 
 # In these, None for `is_active` is compiled apart: without the tests, and as fast as without them.

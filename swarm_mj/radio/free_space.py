@@ -81,18 +81,17 @@ class FreeSpaceRadio:
         """Power received over one metre [mW]; free space scales it by 1/d² (Eqs. 1-2)."""
         return self.power_mw * channel_gain(path_loss_db(1.0, self.frequency_hz))
 
+    @cached_property
+    def rule(self) -> tuple[float, float, float, bool]:
+        """The last arguments of `decode_strongest`."""
+        power_mw, hears = self.received_at_1_m_mw, self.recipient_hears_while_sending
+        return power_mw, self.noise_mw, self.threshold, hears
+
     def __call__(
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes (Eqs. 1-4); arguments as in `Channel`."""
-        return decode_strongest(
-            position_m,
-            recipient,
-            self.received_at_1_m_mw,
-            self.noise_mw,
-            self.threshold,
-            self.recipient_hears_while_sending,
-        )
+        return decode_strongest(position_m, recipient, *self.rule)
 
 
 @compiled()

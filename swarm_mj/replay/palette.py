@@ -1,10 +1,13 @@
 """The colours of replays and videos: one ramp for every age, one colour for every packet's fate.
 
 The ramp is viridis reversed (bright is fresh); the packets' colours are Okabe and Ito's, which stay
-apart for colour-blind eyes. Maps, scenes, plots and legends share them.
+apart for colour-blind eyes. Maps, scenes, plots and legends share them. Those with a name stand in
+`palette.toml`, and are attributes of this module, such as `palette.LOST`.
 """
 
-from typing import NamedTuple, TypeAlias
+import tomllib
+from pathlib import Path
+from typing import Any, NamedTuple, TypeAlias
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -12,35 +15,20 @@ from jaxtyping import Bool, Float, UInt8
 Colour: TypeAlias = tuple[int, int, int]
 Ages: TypeAlias = Float[np.ndarray, "*S"]  # [windows]; nan: unknown
 
-BACKGROUND: Colour = (13, 16, 22)
-PLOT: Colour = (48, 54, 67)  # both a light and a dark time cursor are seen on it
-GRID: Colour = (30, 36, 46)
-WALL: Colour = (112, 122, 138)
-OUTLINE: Colour = (44, 52, 66)
-RANGE: Colour = (44, 55, 74)
-TEXT: Colour = (255, 255, 255)
-EGO: Colour = (255, 255, 255)
-UNKNOWN: Colour = (84, 86, 94)
-SWITCHED_OFF: Colour = (46, 48, 54)
-HEADING: Colour = (205, 210, 220)
-
-DELIVERED: Colour = (0, 205, 145)
-BROADCAST: Colour = (86, 180, 233)
-SENT: Colour = (196, 203, 214)
-LOST: Colour = (240, 98, 42)
-OVERHEARD: Colour = (204, 121, 167)
-ANSWERED: Colour = (86, 180, 233)
-
-TOO_WEAK: Colour = (232, 70, 94)  # links that policies believe in, but that do not decode
-UNBELIEVED: Colour = (0, 148, 108)  # links that decode, but that policies do not believe in
-CUT_OFF: Colour = (150, 38, 56)
+_SAID: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text("utf-8")
+)
+COLOURS: dict[str, Colour] = {name: tuple(rgb) for name, rgb in _SAID["colours"].items()}
 HALO = 1.7  # the radius around a robot that is cut off, by the robot's
-
-MEAN_AGE: Colour = (53, 183, 121)
-WORST_AGE: Colour = (150, 158, 172)
-VARIANCE: Colour = (240, 200, 80)
 # The mean age in videos, of one flight and of a second: no colours of the ramp, which mean ages.
-FILM_CURVES: tuple[Colour, Colour] = ((255, 255, 255), (255, 120, 190))
+FILM_CURVES = COLOURS["FILM_CURVE"], COLOURS["SECOND_FILM_CURVE"]
+
+
+def __getattr__(name: str) -> Colour:
+    """Return a colour by its name."""
+    if name not in COLOURS:
+        raise AttributeError(f"the palette has no {name}")
+    return COLOURS[name]
 
 
 def dim(colour: Colour, share: float) -> Colour:
@@ -55,30 +43,23 @@ class PacketStyle(NamedTuple):
     share: float = 1.0  # of the way to the receiver: a lost packet stops short of it
 
 
+def _by(use: str) -> dict[str, Colour]:
+    return {name: COLOURS[colour] for name, colour in _SAID[use].items()}
+
+
 LOST_SHARE = 0.6
 # By fate. What is drawn first may be covered by what follows.
 PACKETS = {
-    "overheard": PacketStyle(dim(OVERHEARD, 0.6)),
-    "unanswered": PacketStyle(dim(ANSWERED, 0.6), LOST_SHARE),
-    "heard": PacketStyle(BROADCAST),
-    "lost": PacketStyle(LOST, LOST_SHARE),
-    "delivered": PacketStyle(DELIVERED),
-    "answered": PacketStyle(ANSWERED),
+    fate: PacketStyle(dim(COLOURS[colour], shade), LOST_SHARE if stops_short else 1.0)
+    for fate, (colour, shade, stops_short) in _SAID["packets"].items()
 }
 # The fates that charts count, by their curves' colours.
-COUNTED = {"delivered": DELIVERED, "lost": LOST, "overheard": OVERHEARD, "answered": ANSWERED}
+COUNTED = _by("counted")
 # What a robot does with its radio in a window, if packets have an addressee and if not.
 SILENT = "silent"
-ADDRESSED_STATES = {
-    SILENT: BACKGROUND,
-    "overhears": OVERHEARD,
-    "answers": ANSWERED,
-    "is lost": LOST,
-    "delivers": DELIVERED,
-}
-BROADCAST_STATES = {SILENT: BACKGROUND, "hears": RANGE, "transmits": BROADCAST}
+ADDRESSED_STATES, BROADCAST_STATES = _by("addressed_states"), _by("broadcast_states")
 # Links on which channel and belief differ, by kind, in the same order.
-MISMATCH: dict[str, Colour] = {"unbelieved": UNBELIEVED, "too_weak": dim(TOO_WEAK, 0.7)}
+MISMATCH = {"unbelieved": COLOURS["UNBELIEVED"], "too_weak": dim(COLOURS["TOO_WEAK"], 0.7)}
 
 # Nine equal steps of viridis (van der Walt and Smith, 2015, CC0), stale to fresh.
 _VIRIDIS = np.frombuffer(
@@ -94,7 +75,7 @@ def age_colours(age_windows: Ages, full_scale: float) -> UInt8[np.ndarray, "*S 3
     place = (1.0 - (1.0 - _STALEST) * share) * (len(_VIRIDIS) - 1)
     steps = np.arange(len(_VIRIDIS))
     rgb = np.stack([np.interp(place, steps, _VIRIDIS[:, c]) for c in range(3)], axis=-1)
-    rgb[np.isnan(age_windows)] = UNKNOWN
+    rgb[np.isnan(age_windows)] = COLOURS["UNKNOWN"]
     return rgb.astype(np.uint8)
 
 
@@ -103,8 +84,8 @@ def robot_colours(
 ) -> UInt8[np.ndarray, "*S 3"]:
     """RGB of robots by the age of what the ego robot knows of them; it is white, dark ones off."""
     colours = age_colours(age_windows, full_scale)
-    colours[..., ego, :] = EGO
-    return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
+    colours[..., ego, :] = COLOURS["EGO"]
+    return np.where(is_on[..., None], colours, np.array(COLOURS["SWITCHED_OFF"], np.uint8))
 
 
 def nice_scale(age_windows: Ages) -> float:

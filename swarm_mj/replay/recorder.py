@@ -177,15 +177,11 @@ class Recorder:
         costs = self._task_costs[: len(window)]
         value = np.array([cost.value[self._index] for cost in costs])
         facts = self._facts(config or {}, age)
+        flown = (columns[name] for name in ("recipient", "heard", "position_m"))
         return Log(
             facts=facts,
             window=window,
-            packets=links.fates(
-                columns["recipient"],
-                columns["heard"],
-                columns["position_m"],
-                is_broadcast=facts.is_broadcast,
-            ),
+            packets=links.fates(*flown, is_broadcast=facts.is_broadcast),
             ground=shown_ground(columns["position_m"], facts.mission),
             scene=self._swarm.scene,
             age_window=age_window,

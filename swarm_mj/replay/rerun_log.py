@@ -41,7 +41,7 @@ def _layers() -> dict[str, EntityStyle]:
     """Return the styles in `layers.toml`, with the colours that they name."""
     said = tomllib.loads(Path(__file__).with_name("layers.toml").read_text("utf-8"))
     fates = {fate: style.colour for fate, style in PACKETS.items()}
-    colours = vars(palette) | said["colours"] | fates | {"own": None}
+    colours = palette.COLOURS | said["colours"] | fates | {"own": None}
     return {
         path: EntityStyle(getattr(rr, kind), colours[colour], *numbers)
         for path, (kind, colour, *numbers) in said["layers"].items()

@@ -24,15 +24,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.planner.link_tables import (
-    NOTHING,
-    Evidence,
-    Tables,
-    corrected,
-    link_fields,
-    observe,
-    tables_of,
-)
+from swarm_mj.policies.planner import link_tables
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -72,7 +64,7 @@ class RestingPlanner(BroadcastPolicy):
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
         """Return those of observed links; arguments as in `Policy.payload_fields`."""
-        return link_fields(mission) if self._learns else ()
+        return link_tables.link_fields(mission) if self._learns else ()
 
     def inform(self, belief: Belief) -> None:
         """Plan by this belief from now on, also in the turns."""
@@ -130,10 +122,10 @@ class _Team:
         self._followed: list[tuple[np.ndarray, _Flight, np.ndarray]] = []
         self._transmitted = np.zeros(num_robots, dtype=bool)
         self._joined = np.full(num_robots, NOT_YET)  # the slot since when i follows plans
-        self._evidence = Evidence(num_robots)
-        self._current: Tables | None = None
+        self._evidence = link_tables.Evidence(num_robots)
+        self._current: link_tables.Tables | None = None
         self._current_begin = 0  # the slot since when robots fly by these tables
-        self._next: Tables | None = None
+        self._next: link_tables.Tables | None = None
 
     def transmits(self, view: TeamView, in_turn: Bool[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
         """Return who transmits in this slot: by its plan or, if it cannot plan, in turn.
@@ -173,17 +165,17 @@ class _Team:
         # A robot that has been silent for a round may be gone, and is not waited for.
         is_silent = known_until < slot - self._round
         knows_all = np.all(is_silent | (self._joined[None, :] <= known_until), axis=1)
-        kinds = np.full(len(self._everyone), NOTHING)
+        kinds = np.full(len(self._everyone), link_tables.NOTHING)
         for follows, flight, planned in self._followed:
             listens = follows & ~self._transmitted & knows_all
-            noted = observe(listens, heard, planned, flight.expected_mw, flight.prior)
+            noted = link_tables.observe(listens, heard, planned, flight.expected_mw, flight.prior)
             kinds = np.maximum(kinds, noted)
         self._evidence.add(kinds)
         for tables in (self._current, self._next):
             if tables is not None:
                 tables.adopt(heard)
         if self._are_flown(slot + round(self._settings.spread_rounds * self._round)):
-            self._next = tables_of(self._evidence, known_until, self._settings)
+            self._next = link_tables.tables_of(self._evidence, known_until, self._settings)
         if self._are_flown(slot) and self._next is not None:
             self._current, self._current_begin = self._next, slot
             self._flights = {key: of for key, of in self._flights.items() if key[1] is None}
@@ -205,6 +197,6 @@ class _Team:
         if owner is None or self._current is None:
             return _Flight(Plan(prior, self._settings), 0, prior, prior.received_mw)
         table = self._current.table(owner)
-        plan = Plan(corrected(prior, table, self._settings), self._settings)
+        plan = Plan(link_tables.corrected(prior, table, self._settings), self._settings)
         expected_mw = prior.received_mw * from_db(table.mean_db)
         return _Flight(plan, self._current_begin, prior, expected_mw)

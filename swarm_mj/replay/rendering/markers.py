@@ -28,6 +28,7 @@ ROBOT, OBSERVER = 0.0085, 0.0115  # radii
 HEADING, LINE = 0.022, 0.0025  # a length and a width
 SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
+DISC = mjtGeom.mjGEOM_CYLINDER
 NO_TURN, NOWHERE = np.eye(3).ravel(), np.zeros(3)
 HALO_HEIGHT = 0.15  # around a robot that is cut off, by its radius
 LINES_PER_ROBOT = 40  # mismatched links; of very dense teams, some are left out
@@ -112,19 +113,15 @@ def _draw_robots(
     for i, (where, way) in enumerate(zip(footage.position_m[row], way_m, strict=True)):
         radius_m = (OBSERVER if i == footage.ego else ROBOT) * picture_m
         height_m = ROBOT_HEIGHT * radius_m
-        _add_disc(scene, np.append(where, height_m), radius_m, radius_m, colours[i])
+        size_m = np.array([radius_m, radius_m, 0.0])
+        _add(scene, DISC, colours[i], size_m, np.append(where, height_m))
         if footage.is_cut_off[row, i]:
             flat_m, wide_m = HALO_HEIGHT * radius_m, palette.HALO * radius_m
-            _add_disc(scene, np.append(where, flat_m), wide_m, flat_m, palette.CUT_OFF)
+            size_m = np.array([wide_m, flat_m, 0.0])
+            _add(scene, DISC, palette.CUT_OFF, size_m, np.append(where, flat_m))
         if np.any(way):
             start, end = np.append(where, height_m), np.append(where + way, height_m)
             _add_line(scene, start, end, palette.HEADING, line_pixels)
-
-
-def _add_disc(
-    scene: MjvScene, where: np.ndarray, radius_m: float, half_m: float, colour: Shade
-) -> None:
-    _add(scene, mjtGeom.mjGEOM_CYLINDER, colour, np.array([radius_m, half_m, 0.0]), where)
 
 
 def _add_line(
