@@ -70,13 +70,10 @@ class Metrics(dict[str, Any]):
 class Run:
     """One mission flown; ModuleNotFoundError says which package a table, chart or file lacks.
 
-    Attributes:
-        mission: Its numbers.
-        config: Everything that makes this flight again: mission, policy, seed, version and commit.
-        summary: Its costs, by the names that `swarm-mj fly --json` uses: `summary.aoi_mean` is the
-            age of information [windows].
-        windows: The costs of each window.
-        log: The record that a replay shows; None if nothing was recorded.
+    `mission` has its numbers; `config` everything that makes this flight again: mission, policy,
+    seed, version and commit; `summary` its costs, by the names that `swarm-mj fly --json` uses:
+    `summary.aoi_mean` is the age of information [windows]; `windows` the costs of each window;
+    `log` the record that a replay shows, and None if nothing was recorded.
     """
 
     mission: Mission

@@ -27,6 +27,7 @@ _TEXTS = tomllib.loads(Path(__file__).with_name("commands.toml").read_text("utf-
 COMMANDS: dict[str, str] = _TEXTS["commands"]
 BEGINNING: dict[str, str] = _TEXTS["begin_with"]
 EPILOGS: dict[str, str] = _TEXTS["epilogs"]
+OPTIONS: dict[str, dict[str, str]] = _TEXTS["options"]  # what they mean, by command
 
 
 def parse(arguments: Sequence[str]) -> tuple[Any, Any]:

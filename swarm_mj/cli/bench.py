@@ -8,6 +8,7 @@ from pathlib import Path
 from rich.console import Console
 from rich.table import Table
 
+from swarm_mj.cli import OPTIONS
 from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
 from swarm_mj.system.fields import setting
@@ -27,12 +28,7 @@ class BenchOptions:
     missions: tuple[int, ...] = setting((1, 32, 256), "missions side by side", low=1, high=10_000)
     threads: int = setting(1, "threads of MuJoCo and torch", low=1, high=256)
     seconds: float = setting(2.0, "a measurement's time, about", unit="s", low=0.1, high=600.0)
-    episodes: int = setting(
-        100,
-        "missions of each baseline in the evaluation that is timed; 0 leaves it out",
-        low=0,
-        high=10_000,
-    )
+    episodes: int = setting(100, OPTIONS["bench"]["episodes"], low=0, high=10_000)
     jobs: int = setting(2, "processes of that evaluation", low=1, high=256)
     no_learning: bool = setting(False, "leave out the networks and the training")
     robots: tuple[int, ...] = setting(

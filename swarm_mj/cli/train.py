@@ -7,7 +7,7 @@ from typing import Any, ClassVar, get_args
 
 from rich.console import Console
 
-from swarm_mj.cli import EPILOGS, train_settings
+from swarm_mj.cli import EPILOGS, OPTIONS, train_settings
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
@@ -37,8 +37,7 @@ class TrainOptions:
     replay_every: int | None = same_as(Limits, "replay_every")
     device: str | None = setting(
         None,
-        "where the networks learn: cpu, or cuda, an NVIDIA GPU; auto takes a GPU if there is one. "
-        "Missions are on the CPU",
+        OPTIONS["train"]["device"],
         choices=get_args(Device),
         shown="auto, --resume: as before",
     )

@@ -24,6 +24,8 @@ HELD_OUT_SEED, CHOICE_SEED, TEST_SEED = 500_000, 510_000, 520_000
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
 MAX_DECISIONS = 10**12
+# What options mean, by the fields that they set.
+HELP = msgspec.toml.decode(Path(__file__).with_name("options.toml").read_bytes())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,9 +41,7 @@ class PpoSettings:
     num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
     num_minibatches: int = setting(10, low=1, high=10**6)  # into which a rollout is divided
     num_epochs: int = setting(2, low=1, high=1000)  # passes over a rollout
-    discount: float = setting(
-        0.0, "gamma; 0: a packet's credit is that of its own window alone", low=0.0, high=1.0
-    )
+    discount: float = setting(0.0, HELP["discount"], low=0.0, high=1.0)
     gae_lambda: float = setting(0.9, low=0.0, high=1.0)
     clip: float = setting(0.2, low=1e-12, high=1e6)  # of the probability ratio
     clips_value: bool = False  # by the same number
@@ -74,46 +74,27 @@ class Training:
 
     credit_assignment: CreditAssignment = common_setting(
         "robot",
-        "credit assignment, per robot (each is paid for what its own packets changed; learns "
-        "in minutes) or per team (one reward for all, the paper's way)",
+        HELP["credit_assignment"],
         label="credit",
         flag="--credit",
         choices=get_args(CreditAssignment),
     )
     mission: Mission
-    robots: tuple[int, ...] = common_setting(
-        help="size of the team; several are trained on together", low=2, high=MAX_ROBOTS
-    )
-    features: str = setting(
-        "extended",
-        f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
-        "your own",
-    )
+    robots: tuple[int, ...] = common_setting(help=HELP["robots"], low=2, high=MAX_ROBOTS)
+    features: str = setting("extended", HELP["features"].format(", ".join(FEATURE_SETS)))
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
     silence_logit: float = setting(7.0, low=-100.0, high=100.0)
-    reward: Reward = common_setting(
-        "aoi", "the cost to lower; velocity-variance needs --credit team", choices=get_args(Reward)
-    )
+    reward: Reward = common_setting("aoi", HELP["reward"], choices=get_args(Reward))
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
     seed: int = common_setting(0, "the same seed is the same policy", low=0, high=MAX_SEED)
     evaluate_every: int = setting(
-        10_000,
-        "team decisions between two evaluations",
-        label="evaluation interval",
-        low=1,
-        high=MAX_DECISIONS,
+        10_000, HELP["evaluate_every"], label="evaluation interval", low=1, high=MAX_DECISIONS
     )
-    held_out: int = setting(
-        12,
-        "missions of an evaluation, of each team size",
-        label="held-out missions",
-        low=1,
-        high=10_000,
-    )
+    held_out: int = setting(12, HELP["held_out"], label="held-out missions", low=1, high=10_000)
     components: Components = Components()
     threads: int = setting(1, "torch's threads", low=1, high=256)
 

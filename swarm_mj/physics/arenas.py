@@ -64,10 +64,8 @@ def notes_on(mission: Mission) -> list[str]:
     """Return a note on each obstacle in a file that neither robots nor packets can meet."""
     if arena_of(mission) is not _from_file:
         return []
-    idle = idle_obstacles(_read(mission.arena).compile(), mission).items()
-    return [
-        f"arena {mission.arena}: {name} does nothing, as it stands {where}" for name, where in idle
-    ]
+    idle, begins = idle_obstacles(_read(mission.arena).compile(), mission), f"arena {mission.arena}"
+    return [f"{begins}: {name} does nothing, as it stands {idle[name]}" for name in idle]
 
 
 def blocks(spec: MjSpec, mission: Mission) -> None:
