@@ -9,12 +9,13 @@ UV := $(BIN)/uv pip install --python $(BIN)/python --quiet
 ARGS ?=
 SCALE ?= quick
 
-.PHONY: help setup setup-dev fly bench check test test-all attack reference lock audit format figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check test test-all test-engines attack reference lock audit format figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
 	@echo "make test    set up if needed and run the tests, each law once"
 	@echo "make test-all  run the long tests, too: many seeds, a built wheel, the site"
+	@echo "make test-engines  try studies on a Ray cluster and on SLURM's stand-in; installs 0.3 GB"
 	@echo "make attack  run the fault tests for ten minutes and count what held"
 	@echo "make reference  ask the network simulator ns-3 again (Linux on x86-64, with g++)"
 	@echo "make check   formatter, linter and type checker"
@@ -77,6 +78,17 @@ test: $(DEV)
 
 test-all: $(DEV)
 	$(PYTEST) $(ARGS)
+
+# Ray is large and few need it: it has an environment of its own, which sees all of .venv.
+test-engines: $(DEV) .venv/engines/ready
+	PYTHONPATH=. .venv/engines/bin/python -m pytest tests/evaluation/test_engines.py $(ARGS)
+
+.venv/engines/ready: Makefile
+	@$(PYTHON) -m venv .venv/engines
+	@$(BIN)/python -c "import sysconfig; print(sysconfig.get_path('purelib'))" > \
+	  $$(.venv/engines/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/others.pth
+	@.venv/engines/bin/python -m pip install --quiet --disable-pip-version-check ray==2.60.0 submitit==1.5.4
+	@touch $@
 
 attack: $(DEV)
 	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)

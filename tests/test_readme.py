@@ -27,6 +27,7 @@ REASONS = {
     "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari",
     "installs packages": "^pip install",
     "takes minutes": "train",
+    "needs SLURM": "slurm",
 }
 LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml"}
 # Commands run as they are written, but for less long: what comes last on a line counts.
@@ -140,7 +141,11 @@ def test_commands_are_understood_and_other_programs_exist(line):
     elif program == "cp" or (program.endswith("python") and arguments[0] != "-m"):
         assert (ROOT / arguments[0]).is_file()
     else:
-        assert program in {"pip", "git", "tensorboard", ".", ".venv/bin/python", "python"}
+        assert program in {
+            *("pip", "git", "tensorboard", ".", ".venv/bin/python", "python"),
+            "ray",
+            "export",
+        }
 
 
 def test_links_lead_somewhere():

@@ -8,10 +8,10 @@ from typing import TYPE_CHECKING, Any
 from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.engines import Local
+from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.flying import fly_study
 from swarm_mj.evaluation.results import Result
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.evaluation.summary import Evaluated, study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
@@ -123,6 +123,8 @@ def evaluate(
     scene: str | None = None,
     features: str | Sequence[str] = (),
     num_jobs: int = 1,
+    engine: str = "local",
+    address: str | None = None,
     **mission_fields: Any,
 ) -> Evaluation:
     """Fly each policy over the same missions, and average the costs of each.
@@ -146,6 +148,8 @@ def evaluate(
         features: Names of your own feature extractors that learned policies were trained with.
         num_jobs: Processes. With more than one, a script must guard what it runs by
             `if __name__ == "__main__":`, as Python's multiprocessing says.
+        engine: Where they are: "local", "ray" or "slurm"; docs/cluster.md tells more.
+        address: Of a running Ray cluster, such as "auto"; unless given, Ray starts one here.
         **mission_fields: Any field of `Mission`, such as `num_robots=20`.
 
     Raises:
@@ -159,7 +163,7 @@ def evaluate(
     components = {"channel": channel, "controller": controller, "scene": scene}
     for kind, name in components.items():
         _check_named(kind, name)
-    check_value(Processes.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
+    check_value(EngineOptions.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
         policies=_names(policies),
@@ -172,11 +176,13 @@ def evaluate(
         features=(features,) if isinstance(features, str) else tuple(features),
         components=Components(**components),
     )
+    flies = EngineOptions(jobs=num_jobs, engine=engine, address=address).engine_for(study)
+    needs = study_needs(study, num_jobs if engine == "local" else 1)
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
-    check_fits(study_needs(study, num_jobs), None, way_out, is_forced=False, way_on="")
+    check_fits(needs, None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}
     with memory_errors():
-        fly_study(study, costs, Local(num_jobs=num_jobs), None, quiet_console())
+        fly_study(study, costs, flies, None, quiet_console())
     return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
 
 

@@ -16,9 +16,9 @@ from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_m
 from swarm_mj.cli.options import output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.engines import Local
+from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.figures import quiet_matplotlib
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Processes, Study
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
@@ -33,14 +33,13 @@ from swarm_mj.system.writing import Output, check_outputs, owned
 
 
 @dataclass(frozen=True, kw_only=True)
-class StudyFlags:
+class StudyFlags(EngineOptions):
     """How a study is flown, and where its results go."""
 
     EPILOG: ClassVar = (
         "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json or "
         "--csv, --resume continues)."
     )
-    jobs: int = same_as(Processes, "jobs")
     json: Path | None = output_option(
         None, "write all figures and each mission's costs", metavar="FILE.json", is_common=True
     )
@@ -106,7 +105,7 @@ def fly(options: StudyFlags, study: Study) -> int:
     inputs = registry.stored_policies(study.policies)
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
-    needs = study_needs(study, options.jobs)
+    needs = study_needs(study, options.jobs if options.engine == "local" else 1)
     check_fits(needs, options.json or options.csv, way_out, is_forced=options.yes)
     with ExitStack() as stack:
         for path in filter(None, (options.json, options.csv)):
@@ -116,7 +115,8 @@ def fly(options: StudyFlags, study: Study) -> int:
 
 def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     """Fly the rest of a study, and write its results; `kept` is the progress file."""
-    tell_cores(options.jobs)
+    engine = options.engine_for(study)
+    tell_cores(options.jobs if options.engine == "local" else 1)
     console = Console(stderr=True, highlight=False)
     if study.pairs != list(product(study.regimes, study.policies)):
         console.print(registry.FLOWN_AS)
@@ -129,7 +129,7 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     try:
         keep = partial(flying.append_progress, kept, header) if kept else None
         with memory_errors():
-            flying.fly_study(study, costs, Local(num_jobs=options.jobs), keep, console)
+            flying.fly_study(study, costs, engine, keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         ending = "Out of memory" if is_memory else "Interrupted"

@@ -1,35 +1,52 @@
 """Engines: who does the pieces of a study, one protocol for all of them."""
 
 import os
+import shutil
 import signal
-from collections.abc import Callable, Generator, Iterator, Sequence
+import socket
+import sys
+import traceback
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
+from itertools import islice
 from multiprocessing import get_context, resource_tracker
-from typing import Protocol, TypeVar, runtime_checkable
+from pathlib import Path
+from tempfile import TemporaryDirectory, mkdtemp
+from typing import Any, Protocol, runtime_checkable
 
+from swarm_mj.evaluation.study import Study
+from swarm_mj.mission.components import is_users
+from swarm_mj.policies.registry import stored_policies
+from swarm_mj.policies.stored import find_policy
+from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
+from swarm_mj.system.packages import code_digest, need
 from swarm_mj.system.processes import guard
 
-Piece = TypeVar("Piece")
-Product = TypeVar("Product")
+Work = Callable[[Any], Any]
+Done = Generator[tuple[int, Any]]  # pieces' indices and products
 
 # Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
 # look for a window system, which it does by a program that complains if it is left.
 SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 # Nor does any import modules of the current folder, as `python -c` would.
 SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
+# Ray sends nothing to its makers, and does not warn of GPUs.
+QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
+SHOWN: dict[str, Any] = {"group": "processes that fly missions", "is_common": True}
+MAX_ARRAY, ATTEMPTS = 1000, 3  # SLURM's usual limit of jobs in an array; how often one is submitted
 
 
 @runtime_checkable
 class Engine(Protocol):
     """Does pieces of work in other processes, wherever they are."""
 
-    def run(
-        self, work: Callable[[Piece], Product], pieces: Sequence[Piece]
-    ) -> Generator[tuple[int, Product]]:
+    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
         """Do all pieces; yield each one's index and product once, in the order they are done.
 
         The processes import `work`; pieces and products are pickled on the way. They end with the
@@ -48,9 +65,7 @@ class Local:
 
     num_jobs: int = 1
 
-    def run(
-        self, work: Callable[[Piece], Product], pieces: Sequence[Piece]
-    ) -> Generator[tuple[int, Product]]:
+    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
         """Do all pieces, as `Engine.run` says."""
         num_jobs = min(self.num_jobs, len(pieces))
         if num_jobs <= 1:
@@ -73,6 +88,139 @@ class Local:
             finally:
                 for process in list(pool._processes.values()):
                     process.kill()  # without waiting for the pieces under way
+
+
+@dataclass(frozen=True, kw_only=True)
+class Ray:
+    """Tasks of the Ray cluster at `address`, or of one of `num_jobs` CPUs that is started here."""
+
+    num_jobs: int = 1
+    address: str | None = None
+    files: Sequence[Path] = ()  # that pieces name
+
+    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
+        """Do all pieces, as `Engine.run` says."""
+        os.environ.update(QUIET)
+        ray: Any = import_module("ray")
+        here = {"address": "local", "num_cpus": self.num_jobs}
+        how: dict[str, Any] = {"address": self.address} if self.address else here
+        try:
+            # Its end puts back the handlers of signals that Ray replaces.
+            with deferred_interrupt() as is_interrupted, TemporaryDirectory() as parts:
+                _copy_parts(parts, self.files)
+                how["runtime_env"] = {"working_dir": parts, "env_vars": SURROUNDINGS}
+                ray.init(**how, logging_level="ERROR", log_to_driver=False)
+            if is_interrupted():
+                raise KeyboardInterrupt
+            do, code, left = ray.remote(max_retries=-1)(_do), code_digest(), enumerate(pieces)
+            tasks = []
+            while True:
+                # Never a million tasks at once, and as many CPUs as there are by now.
+                num_tasks = 2 * int(ray.cluster_resources().get("CPU", 0)) + 1
+                more = islice(left, max(0, num_tasks - len(tasks)))
+                tasks += [do.remote(work, code, [piece]) for piece in more]
+                if not tasks:
+                    return
+                done, tasks = ray.wait(tasks)
+                yield from _unpacked(ray.get(done[0]))
+        except (ray.exceptions.RayError, RuntimeError) as error:
+            raise OSError(f"Ray gave up: {str(error).strip()}") from error
+        finally:
+            ray.shutdown()
+
+
+@dataclass(frozen=True, kw_only=True)
+class Slurm:
+    """Arrays of SLURM's jobs, `num_jobs` at a time; what fails is submitted again."""
+
+    num_jobs: int = 1
+    cluster: str = "slurm"  # or submitit's "local": processes here
+
+    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
+        """Do all pieces, as `Engine.run` says."""
+        submitit: Any = import_module("submitit")
+        folder = mkdtemp(prefix="slurm-", dir=Path.cwd())  # which all machines see
+        executor = submitit.AutoExecutor(folder, cluster=self.cluster)
+        setup = [f"export {name}={value}" for name, value in SURROUNDINGS.items()]
+        most = {"slurm_array_parallelism": self.num_jobs, "timeout_min": 24 * 60}
+        executor.update_parameters(**most, slurm_setup=setup)
+        left = dict(enumerate(pieces))
+        for _ in range(ATTEMPTS):
+            shares = [list(left.items())[k::MAX_ARRAY] for k in range(min(len(left), MAX_ARRAY))]
+            try:
+                jobs = executor.map_array(partial(_do, work, code_digest()), shares)
+            except RuntimeError as error:
+                raise OSError(f"sbatch takes no jobs: {str(error).strip()}") from error
+            for index, product in _finished(jobs, submitit.helpers.as_completed(jobs, None, 1)):
+                del left[index]
+                yield index, product
+            if not left:
+                return shutil.rmtree(folder)
+        raise OSError(f"{len(left)} pieces failed {ATTEMPTS} times; the logs are in {folder}")
+
+
+def _finished(jobs: Sequence[Any], completed: Iterable[Any]) -> Done:
+    """Yield what submitit's jobs did; cancel those that are left if the generator is closed."""
+    try:
+        for job in completed:
+            if not job.exception():
+                yield from _unpacked(job.result())
+    finally:
+        for job in jobs:
+            if not job.done():
+                job.cancel(check=False)
+
+
+def _do(work: Work, code: str, share: Sequence[tuple[int, Any]]) -> list[Any] | Exception:
+    """Return pieces' indices and products in another process, or what went wrong."""
+    if code_digest() != code:
+        other = f"{socket.gethostname()} has other code, digest {code_digest():.12}"
+        return OSError(f"{other}, not {code:.12} as here; install the same on all machines")
+    try:
+        return [(index, work(piece)) for index, piece in share]
+    except Exception as error:
+        error.add_note(traceback.format_exc())  # which is lost on the way
+        return error
+
+
+def _unpacked(done: list[Any] | Exception) -> list[Any]:
+    if isinstance(done, Exception):
+        raise done
+    return done
+
+
+def _copy_parts(folder: str, files: Sequence[Path]) -> None:
+    """Copy modules of the user's that are loaded, and files, from the current folder."""
+    own = [name for name in list(sys.modules) if is_users(name) and not name.startswith("swarm_mj")]
+    for path in (*files, *(str(sys.modules[name].__file__) for name in own)):
+        target = Path(folder, os.path.relpath(path))
+        if os.path.isfile(path) and ".." not in target.parts:  # torch's are no files
+            target.parent.mkdir(parents=True, exist_ok=True)
+            shutil.copyfile(path, target)
+
+
+@dataclass(frozen=True, kw_only=True)
+class EngineOptions:
+    """Who flies a study's missions."""
+
+    jobs: int = setting(1, "how many at once", low=1, high=256, **SHOWN)
+    engine: str = setting("local", "who starts them", choices=("local", "ray", "slurm"), **SHOWN)
+    address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", **SHOWN)
+
+    def engine_for(self, study: Study) -> Engine:
+        """Return the engine; raise ValueError for what is not known or does not fit."""
+        check(self)
+        if self.address and self.engine != "ray":
+            raise ValueError(f"address {self.address} is of a Ray cluster; add --engine ray")
+        if self.engine == "ray":
+            need("ray", "the engine ray")
+            files = [find_policy(path) for path in stored_policies(study.policies)]
+            return Ray(num_jobs=self.jobs, address=self.address, files=files)
+        if self.engine == "slurm":
+            need("submitit", "the engine slurm")
+            if not shutil.which("sbatch"):
+                raise OSError("there is no sbatch here; --engine slurm needs a machine that has it")
+        return (Slurm if self.engine == "slurm" else Local)(num_jobs=self.jobs)
 
 
 @contextmanager

@@ -17,7 +17,7 @@ import numpy as np
 from rich.console import Console
 
 from swarm_mj.evaluation.batch import BatchCosts, fly_batch
-from swarm_mj.evaluation.engines import Engine
+from swarm_mj.evaluation.engines import Engine, Local
 from swarm_mj.evaluation.study import Study
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.reading import read_file
@@ -47,7 +47,7 @@ def fly_study(
         KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
-    flown = engine.run(fly_batch, [study.batches[index] for index in left])
+    flown = (engine if left else Local()).run(fly_batch, [study.batches[index] for index in left])
     bar = WorkBar(
         "Flying",
         study.num_missions,

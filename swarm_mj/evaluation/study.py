@@ -23,13 +23,6 @@ BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an
 
 
 @dataclass(frozen=True, kw_only=True)
-class Processes:
-    """How many processes share a study's missions."""
-
-    jobs: int = setting(1, "processes", low=1, high=256, is_common=True)
-
-
-@dataclass(frozen=True, kw_only=True)
 class Study:
     """The settings of an evaluation; all policies fly the same missions in each regime.
 

@@ -125,7 +125,7 @@ def load(kind: str, name: str) -> object:
     found = getattr(module, attribute)
     # Errors are blamed on the module named, and on that which it took the code from.
     home = getattr(unwrapped(found), "__module__", None) or module_name
-    for each in (module_name, *([home] if _is_users(home) else [])):
+    for each in (module_name, *([home] if is_users(home) else [])):
         if each.partition(".")[0] != PACKAGE:
             _loaded[each] = f"{kind} {name}"
     return found
@@ -221,7 +221,7 @@ def _in_a_line(error: BaseException, module: str) -> str:
     return f"{said} ({os.path.relpath(frame.f_code.co_filename)}, line {line})"
 
 
-def _is_users(home: str) -> bool:
+def is_users(home: str) -> bool:
     """Return whether a module is a file that neither Python nor an installed package brought."""
     file = getattr(sys.modules.get(home), "__file__", None)
     places = [sysconfig.get_path(kind) for kind in ("stdlib", "platstdlib", "purelib", "platlib")]

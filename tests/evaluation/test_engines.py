@@ -1,14 +1,37 @@
-"""Engines do all pieces once, and end with whoever started them."""
+"""Engines do all pieces once, and end with whoever started them.
 
+Those of a Ray cluster and of SLURM are tried by `make test-engines`, which has what they need.
+"""
+
+import math
 import multiprocessing
 import os
+import secrets
+import shutil
 import signal
+import socket
+import subprocess
+import sys
 import time
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from tempfile import mkdtemp
 
+import psutil
 import pytest
+from rich.console import Console
+from tiny_policies import save_tiny
 
-from swarm_mj.evaluation.engines import SURROUNDINGS, Local
+from swarm_mj.cli import main
+from swarm_mj.evaluation import engines
+from swarm_mj.evaluation.engines import SURROUNDINGS, EngineOptions, Local, Ray, Slurm
+from swarm_mj.evaluation.flying import fly_study
+from swarm_mj.evaluation.study import Study
+from swarm_mj.evaluation.summary import study_results, write_evaluated
+from swarm_mj.mission import paper
 from swarm_mj.system.interrupt import INTERRUPTS
+
+ROOT = Path(__file__).parents[2]
 
 
 def square(piece):
@@ -94,3 +117,222 @@ def test_breaking_off_ends_the_jobs_at_once():
 def test_jobs_run_nothing_of_the_folder_here(trapped):
     assert sorted(product for _, (product, _) in Local(num_jobs=2).run(square, [2, 3])) == [4, 9]
     assert not trapped.exists()
+
+
+STUDY = Study(
+    policies=("tdma", "random-flooding"),
+    regimes=(paper("random-walk", num_robots=4, num_windows=20),),
+    episodes=60,
+)
+
+
+@pytest.fixture(scope="module")
+def alone(tmp_path_factory):
+    """What one process of this machine writes of STUDY."""
+    return written(Local(), tmp_path_factory.mktemp("alone"))
+
+
+def written(engine, folder):
+    """The files of STUDY, as bytes, by their suffixes."""
+    costs = {}
+    fly_study(STUDY, costs, engine, None, Console(file=None, quiet=True))
+    assert set(costs) == set(range(len(STUDY.batches)))
+    found = {}
+    for suffix in (".csv", ".json"):
+        path = folder / f"study{suffix}"
+        write_evaluated(path, study_results(STUDY, costs, STUDY.header()))
+        found[suffix] = path.read_bytes()
+    return found
+
+
+class Backwards:
+    """Does the last piece first."""
+
+    def run(self, work, pieces):
+        yield from ((index, work(pieces[index])) for index in reversed(range(len(pieces))))
+
+
+def test_the_order_in_which_an_engine_is_done_changes_nothing(alone, tmp_path):
+    assert written(Backwards(), tmp_path) == alone
+
+
+@pytest.mark.parametrize(
+    ("options", "complaint"),
+    [
+        ({"engine": "rya"}, "engine must be one of local, ray, slurm, not 'rya'; did you mean ray"),
+        ({"address": "auto"}, "address auto is of a Ray cluster; add --engine ray"),
+        ({"engine": "slurm", "address": "auto"}, "address auto is of a Ray cluster"),
+    ],
+)
+def test_what_no_engine_can_do_is_refused(options, complaint):
+    with pytest.raises(ValueError, match=complaint):
+        EngineOptions(**options).engine_for(STUDY)
+
+
+@pytest.mark.parametrize(("engine", "package"), [("ray", "ray"), ("slurm", "submitit")])
+def test_an_engine_that_is_not_installed_leaves_nothing(here, monkeypatch, capsys, engine, package):
+    monkeypatch.setattr("swarm_mj.system.packages.is_installed", lambda module: module == "scipy")
+    assert main(["evaluate", "--policy", "tdma", "--engine", engine, "--csv", "a.csv"]) != 0
+    assert f"the engine {engine} needs {package}, which is not in" in capsys.readouterr().err
+    assert list(here.iterdir()) == []
+
+
+def test_slurm_without_sbatch_is_refused(monkeypatch, tmp_path):
+    pytest.importorskip("submitit", reason="needs submitit: make test-engines")
+    monkeypatch.setenv("PATH", str(tmp_path))
+    with pytest.raises(OSError, match="there is no sbatch here"):
+        EngineOptions(engine="slurm").engine_for(STUDY)
+
+
+@pytest.fixture
+def jobs(here):  # noqa: ARG001
+    """SLURM's engine with submitit's processes in place of SLURM's jobs."""
+    pytest.importorskip("submitit", reason="needs submitit: make test-engines")
+    return Slurm(cluster="local")
+
+
+def sent(work):
+    """A function that is pickled by value, as those of a script are: no other process has these."""
+    work.__module__ = "__main__"
+    return work
+
+
+@sent
+def die(_piece):
+    os.kill(os.getpid(), signal.SIGKILL)
+
+
+def test_jobs_write_what_one_process_writes(jobs, here, alone, monkeypatch):
+    """Among them one job that is killed, whose pieces are submitted again."""
+    kill_one(monkeypatch, here)
+    assert written(jobs, here) == alone
+    assert (here / "killed").exists()
+    assert not list(here.glob("slurm-*"))
+
+
+def kill_one(monkeypatch, folder):
+    """Has the first job that begins to fly die at once."""
+    code = """
+import os, signal, sys
+if "submitit.core._submit" in " ".join(sys.orig_argv) and not os.path.exists("killed"):
+    open("killed", "w").close()
+    os.kill(os.getpid(), signal.SIGKILL)
+"""
+    (folder / "sitecustomize.py").write_text(code)
+    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), str(ROOT)]))
+
+
+def test_pieces_that_always_fail_are_given_up(jobs, monkeypatch):
+    monkeypatch.setattr(engines, "ATTEMPTS", 1)
+    with pytest.raises(OSError, match=r"1 pieces failed 1 times; the logs are in .*slurm-") as told:
+        list(jobs.run(die, [0]))
+    assert list(Path(str(told.value).rpartition(" ")[2]).glob("*_log.err"))
+
+
+@pytest.fixture(scope="module")
+def cluster():
+    """The address of a Ray cluster of one node, with one CPU."""
+    # Ray reads them as it is imported, and keeps a token in one's home unless it has one.
+    os.environ |= {"RAY_AUTH_MODE": "token", "RAY_AUTH_TOKEN": secrets.token_hex(32)}
+    pytest.importorskip("ray", reason="needs ray: make test-engines")
+    folder = mkdtemp(prefix="ray-", dir="/tmp")  # a socket's path must be short
+    with socket.socket() as free:
+        free.bind(("127.0.0.1", 0))
+        address = f"127.0.0.1:{free.getsockname()[1]}"
+    head = ["--head", f"--port={address.partition(':')[2]}", f"--temp-dir={folder}"]
+    with node(*head, "--include-dashboard=false"):
+        yield address
+    shutil.rmtree(folder)
+
+
+@contextmanager
+def node(*options):
+    """Starts a node, and kills it with all its processes in the end."""
+    program = [sys.executable, "-m", "ray.scripts.scripts", "start", "--block", "--num-cpus=1"]
+    more = ["--node-ip-address=127.0.0.1", "--object-store-memory=100000000", *options]
+    environment = os.environ | engines.QUIET | {"PYTHONPATH": str(ROOT)}
+    with subprocess.Popen([*program, *more], env=environment, stdout=subprocess.PIPE) as process:
+        while b"This command will now block" not in process.stdout.readline():
+            assert process.poll() is None
+        try:
+            yield process
+        finally:
+            kill(process)
+
+
+def kill(process):
+    """Kills a process, if it runs, and all that it started."""
+    if process.poll() is None:
+        for each in [*psutil.Process(process.pid).children(recursive=True), process]:
+            with suppress(psutil.NoSuchProcess):
+                each.kill()
+        process.wait()
+
+
+def evaluate(*more):
+    """A program that flies missions of 32 batches into o.csv, as a process."""
+    command = [sys.executable, "-m", "swarm_mj", "evaluate", "--policy", "tdma", "./mine"]
+    command += ["--robots", "4", "--windows", "100", "--channel", "my_channel:Lossy"]
+    command += ["--episodes", "400", "--csv", "o.csv", *more]
+    environment = os.environ | {"PYTHONPATH": str(ROOT)}
+    return subprocess.Popen(command, env=environment, stderr=subprocess.PIPE, text=True)
+
+
+@pytest.fixture
+def own(here):
+    """A folder with a policy and a channel of one's own."""
+    save_tiny(here / "mine")
+    code = (ROOT / "README.md").read_text().split("```python\n")[-1]
+    (here / "my_channel.py").write_text(code.partition("mission = ")[0])
+    return here
+
+
+def wait_for(num_batches, path, study):
+    """Waits until as many batches have been kept."""
+    while not path.exists() or len(path.read_bytes().splitlines()) <= num_batches:
+        assert study.poll() is None, study.stderr.read()
+        time.sleep(0.05)
+
+
+def test_a_cluster_of_which_a_node_is_killed_writes_what_one_process_writes(own, cluster):
+    """Its workers have what the study names in the folder here, and the terminal stays quiet.
+
+    It goes on after Ctrl-C and after the command was killed, too.
+    """
+    alone = evaluate()
+    assert alone.wait() == 0
+    expected = (own / "o.csv").read_bytes()
+    progress, with_ray = own / "o.csv.progress", ["--engine", "ray", "--address", cluster]
+    with node(f"--address={cluster}") as second:
+        study = evaluate("--force", *with_ray)
+        wait_for(3, progress, study)
+        kill(second)
+    assert len(progress.read_bytes().splitlines()) < 20  # it is in the middle
+    wait_for(7, progress, study)
+    study.send_signal(signal.SIGINT)
+    assert "--resume" in study.communicate()[1]
+    study = evaluate("--force", "--resume", *with_ray)
+    wait_for(11, progress, study)
+    study.kill()
+    study.wait()
+    study = evaluate("--force", "--resume", *with_ray)
+    assert study.communicate()[1] == ""
+    assert study.returncode == 0
+    assert (own / "o.csv").read_bytes() == expected
+
+
+def test_what_a_task_raises_and_other_code_end_a_study(here, cluster, monkeypatch):  # noqa: ARG001
+    ray = Ray(address=cluster)
+    with pytest.raises(ValueError, match="factorial"):
+        list(ray.run(math.factorial, [3, -1]))
+    monkeypatch.setattr(engines, "code_digest", lambda: 64 * "0")
+    with pytest.raises(OSError, match=r"has other code, digest [0-9a-f]{12}, not 000000000000 as"):
+        list(ray.run(math.factorial, [3]))
+
+
+def test_tasks_start_no_threads_and_leave_signals_as_they_were(here, cluster):  # noqa: ARG001
+    before = {number: signal.getsignal(number) for number in INTERRUPTS}
+    for ray in (Ray(address=cluster), Ray(num_jobs=2)):
+        done = dict(ray.run(os.getenv, [*SURROUNDINGS]))
+        assert done == dict(enumerate(SURROUNDINGS.values()))
+    assert {number: signal.getsignal(number) for number in INTERRUPTS} == before
