@@ -167,13 +167,15 @@ def window(
     for slot in range(num_slots):
         t, sent_to = now + slot * SLOT_WINDOWS, answers
         silence(sent_to, states.is_active)
+        if not isinstance(channel, AsynchronousChannel):  # a user's channel may look at buffers
+            observe_self(buffers, states, t)
         heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
         silence(heard, states.is_active)
         phases.append(punctual := Phase(recipient=sent_to, heard=heard))
         if isinstance(channel, AsynchronousChannel):  # late packets carry what was known before
             late, punctual = (Phase(*each) for each in channel.split(heard))
             merge(buffers, late.heard, entries_sent(buffers, late.recipient))
-        observe_self(buffers, states, t)
+            observe_self(buffers, states, t)
         merge(buffers, punctual.heard, entries_sent(buffers, punctual.recipient))
         answers = respondents(punctual)
     return tuple(phases)
