@@ -57,16 +57,8 @@ class ExtendedFeatures(FeatureExtractor):
         may_address = np.empty(node.shape, dtype=np.bool_)
         is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
         window = views.now.astype(np.int64)
-        _write_ages_and_news(
-            memory=self._memory,
-            last_attempt=buffers.last_attempt,
-            is_observed=buffers.is_known,
-            believed_m=buffers.position_m,
-            now=views.now,
-            range_m=range_m,
-            node=node,
-            may_address=may_address,
-        )
+        seen = buffers.last_attempt, buffers.is_known, buffers.position_m, views.now
+        _write_ages_and_news(self._memory, *seen, range_m, node, may_address)
         _write_beliefs(buffers.position_m, is_known, window, range_m, node)
         threshold, has_joined = from_db(self._mission.sinr_threshold_db), node["has_joined"]
         write_joined(buffers.position_m, is_known, window, range_m, threshold, has_joined)

@@ -115,16 +115,8 @@ def _with_state(
 ) -> Graphs:
     """Write what the buffers hold into nodes; in their graphs everyone may be addressed."""
     buffers = views.buffers
-    _write_state(
-        timestamp=buffers.timestamp,
-        last_attempt=buffers.last_attempt,
-        position_m=buffers.position_m,
-        velocity_mps=buffers.velocity_mps,
-        now=views.now,
-        is_relative=is_relative,
-        scale=scale,
-        node=node,
-    )
+    known = buffers.timestamp, buffers.last_attempt, buffers.position_m, buffers.velocity_mps
+    _write_state(*known, views.now, is_relative, scale, node)
     num_missions, num_robots = buffers.shape
     rows = num_missions * num_robots, num_robots
     return Graphs(
