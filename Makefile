@@ -152,6 +152,7 @@ figures: setup
 	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig5 fig6 --policy $(OURS) \
 	  --out assets/figures/policies --force
 	$(BIN)/python training/limits_figure.py
+	$(BIN)/python training/impairments_figure.py
 	$(BIN)/python training/readme_figure.py
 	$(BIN)/python training/large_teams_figure.py
 	$(BIN)/python training/learning_figure.py
