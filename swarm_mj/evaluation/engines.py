@@ -38,7 +38,7 @@ SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS",
 SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
-SHOWN: dict[str, Any] = {"group": "processes that fly missions", "is_common": True}
+GROUP: dict[str, Any] = {"group": "processes that fly missions"}
 MAX_ARRAY, ATTEMPTS = 1000, 3  # SLURM's usual limit of jobs in an array; how often one is submitted
 
 
@@ -203,9 +203,9 @@ def _copy_parts(folder: str, files: Sequence[Path]) -> None:
 class EngineOptions:
     """Who flies a study's missions."""
 
-    jobs: int = setting(1, "how many at once", low=1, high=256, **SHOWN)
-    engine: str = setting("local", "who starts them", choices=("local", "ray", "slurm"), **SHOWN)
-    address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", **SHOWN)
+    jobs: int = setting(1, "how many at once", low=1, high=256, is_common=True, **GROUP)
+    engine: str = setting("local", "who starts them", choices=("local", "ray", "slurm"), **GROUP)
+    address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", **GROUP)
 
     def engine_for(self, study: Study) -> Engine:
         """Return the engine; raise ValueError for what is not known or does not fit."""
