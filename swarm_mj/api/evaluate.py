@@ -97,14 +97,11 @@ class Evaluation:
     def save(self, path: str | Path) -> Path:
         """Write what `swarm-mj evaluate` does, replacing the file if it exists; return the path.
 
-        It ends in .csv, one row per policy, or .json, with what each mission cost.
-
-        Raises:
-            ValueError: The name has another ending.
-            OSError: The file cannot be written.
+        It ends in .csv, one row per policy, .json, with what each mission cost, or .parquet, one
+        row per mission. Raises ValueError for another ending, OSError if it cannot be written.
         """
         path = Path(path)
-        check_outputs(Output("the file", path, ".csv|.json"))
+        check_outputs(Output("the file", path, ".csv|.json|.parquet"))
         write_evaluated(path, self.results)
         return path
 
@@ -152,11 +149,9 @@ def evaluate(
         address: Of a running Ray cluster, such as "auto"; unless given, Ray starts one here.
         **mission_fields: Any field of `Mission`, such as `num_robots=20`.
 
-    Raises:
-        ValueError: A value is unknown or out of range, or memory does not suffice.
-        TypeError: An argument is of the wrong kind, or has a name that is not known.
-        ModuleNotFoundError: SciPy is not installed, which finds intervals.
-        KeyboardInterrupt: Ctrl-C was pressed; nothing is kept.
+    Raises ValueError for a value that is unknown or out of range, or if memory does not suffice;
+    TypeError for an argument of the wrong kind or an unknown name; ModuleNotFoundError without
+    SciPy, which finds intervals; KeyboardInterrupt by Ctrl-C, and nothing is kept.
     """
     need("scipy", "an evaluation")
     mission = mission_of(evaluate, task, mission_fields)

@@ -37,14 +37,17 @@ class StudyFlags(EngineOptions):
     """How a study is flown, and where its results go."""
 
     EPILOG: ClassVar = (
-        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json or "
-        "--csv, --resume continues)."
+        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json, "
+        "--csv or --parquet, --resume continues)."
     )
     json: Path | None = output_option(
         None, "write all figures and each mission's costs", metavar="FILE.json", is_common=True
     )
     csv: Path | None = output_option(
         None, "write all figures, one row a result", metavar="FILE.csv", is_common=True
+    )
+    parquet: Path | None = output_option(
+        None, "write each mission's costs, one row a mission", metavar="FILE.parquet"
     )
     plot: Path | None = output_option(
         None,
@@ -60,6 +63,11 @@ class StudyFlags(EngineOptions):
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)
     resume: bool = output_option(False, "continue where an interruption broke off")
+
+    @property
+    def files(self) -> list[Path]:
+        """The files of the results; beside the first is the progress."""
+        return [path for path in (self.json, self.csv, self.parquet) if path]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -98,7 +106,8 @@ def run(options: EvaluateOptions) -> int:
 def fly(options: StudyFlags, study: Study) -> int:
     """Fly a study as asked, and write its results; return the exit code."""
     need("scipy", "an evaluation")
-    outputs = Output("--json", options.json, ".json"), Output("--csv", options.csv, ".csv")
+    kinds = ("json", "csv", "parquet")
+    outputs = [Output(f"--{kind}", getattr(options, kind), f".{kind}") for kind in kinds]
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
     if options.plot:
         need("matplotlib", "a chart")
@@ -106,9 +115,9 @@ def fly(options: StudyFlags, study: Study) -> int:
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
     needs = study_needs(study, options.jobs if options.engine == "local" else 1)
-    check_fits(needs, options.json or options.csv, way_out, is_forced=options.yes)
+    check_fits(needs, next(iter(options.files), None), way_out, is_forced=options.yes)
     with ExitStack() as stack:
-        for path in filter(None, (options.json, options.csv)):
+        for path in options.files:
             stack.enter_context(owned(path))
         return _evaluate(options, study, _progress_file(options, outputs))
 
@@ -139,7 +148,7 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
         evaluated = study_results(study, costs, header)
-        for path in filter(None, (options.json, options.csv)):
+        for path in options.files:
             write_evaluated(path, evaluated)
         if kept:
             kept.unlink()
@@ -157,12 +166,11 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
 
 def _progress_file(options: StudyFlags, outputs: Iterable[Output]) -> Path | None:
     """Return the progress file, or None without outputs; raise ValueError if it is in the way."""
-    output = options.json or options.csv
-    if output is None:
+    if not options.files:
         if options.resume:
-            raise ValueError("--resume needs the --json or --csv of the run that was interrupted")
+            raise ValueError("--resume needs the --json or --csv, or --parquet, that it continues")
         return None
-    kept = flying.progress_path(output)
+    kept = flying.progress_path(options.files[0])
     check_outputs(Output("progress", kept), *outputs)  # also against a link to the progress
     if kept.exists() and not (options.resume or options.force):
         raise ValueError(

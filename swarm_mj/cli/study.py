@@ -1,4 +1,4 @@
-"""`swarm-mj study`: flies a study that is a file."""
+"""`swarm-mj study`: flies a study that is a file, or compares two results."""
 
 import tomllib
 from dataclasses import dataclass, fields
@@ -11,11 +11,14 @@ from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
 from swarm_mj.policies import registry
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import check_kind, check_names, did_you_mean, setting
-from swarm_mj.system.packages import asset
+from swarm_mj.system.packages import asset, need
 from swarm_mj.system.reading import read_file
+from swarm_mj.system.terminal import plain_console
 
 MAX_BYTES = 1_000_000
+TAKES = {"run": "FILE.toml", "compare": "BEFORE.parquet AFTER.parquet"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -27,15 +30,33 @@ class StudyOptions(StudyFlags):
         "(of Mission in Python; of several values, each is flown) and [missions.NAME], which adds "
         f"missions of its own. {StudyFlags.EPILOG}"
     )
-    action: str = setting(help="fly it", choices=("run",), is_positional=True)
-    file: str = setting(
-        help="FILE.toml, or the name of a study that is shipped", metavar="FILE", is_positional=True
+    action: str = setting(help="run or compare", choices=tuple(TAKES), is_positional=True)
+    named: tuple[str, ...] = setting(
+        help="a study to run, FILE.toml or a shipped one's name; or two results to compare, each "
+        "written by --parquet",
+        metavar="FILE",
+        is_positional=True,
     )
 
 
 def run(options: StudyOptions) -> int:
     """Run the command; return its exit code."""
-    return fly(options, read_study(options.file))
+    action, named = options.action, options.named
+    if len(named) != len(TAKES[action].split()):
+        raise ValueError(f"study {action} takes {TAKES[action]}, not {' '.join(named)}")
+    if action == "run":
+        return fly(options, read_study(*named))
+    if options != StudyOptions(action=action, named=named):
+        raise ValueError("study compare prints what it finds; leave out the options")
+    need("scipy", "a comparison")
+    from swarm_mj.evaluation.missions_table import compared, read_missions  # pandas is slow
+
+    before, after = (read_missions(Path(name)) for name in named)
+    for cost in ("aoi", "task_cost"):
+        rows = compared(before, after, cost)
+        table = rows.to_string(index=False, na_rep="-", float_format="{:.3g}".format)
+        plain_console().print(f"{cost}, means over missions, with 95 % intervals\n{table}\n")
+    return DONE
 
 
 def read_study(name: str) -> Study:

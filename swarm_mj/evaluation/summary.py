@@ -44,12 +44,18 @@ class Evaluated:
 def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
     """Write what `write_results` does into a .csv, and what each mission cost, too, into a .json.
 
-    A file that exists is replaced. JSON is `{"results": [...]}`; what does not exist is null.
+    A file that exists is replaced. JSON is `{"results": [...]}`; what does not exist is null. A
+    .parquet has a row for each mission.
     """
-    if path.suffix.lower() == ".csv":
+    ending = path.suffix.lower()
+    if ending == ".csv":
         write_results(path, [each.result for each in evaluated])
-    else:
+    elif ending == ".json":
         write_json(path, {"results": [each.row for each in evaluated]})
+    else:
+        from swarm_mj.evaluation.missions_table import write_missions  # pandas is slow to import
+
+        write_missions(path, evaluated)
 
 
 def study_results(

@@ -1,7 +1,8 @@
-"""`swarm-mj study`: files that are studies."""
+"""`swarm-mj study`: files that are studies, and results that are compared."""
 
 import json
 
+import pandas as pd
 import pytest
 
 from swarm_mj.cli import parse
@@ -125,7 +126,11 @@ def test_what_no_study_may_say_is_refused_in_a_line_that_names_the_file(refusal,
         ("run nowhere.toml", "study nowhere.toml cannot be found"),
         ("run impairment", "not impairment; did you mean impairments?"),
         ("run r.json", "impairments-small"),
-        ("fly s.toml", "action must be one of run, not 'fly'"),
+        ("fly s.toml", "action must be one of run, compare, not 'fly'"),
+        ("run a.toml b.toml", "study run takes FILE.toml, not a.toml b.toml"),
+        ("compare a.parquet", "study compare takes BEFORE.parquet AFTER.parquet, not a.parquet"),
+        ("compare a.parquet b.parquet --csv c.csv", "leave out the options"),
+        ("compare a.parquet b.parquet", "missions a.parquet cannot be found"),
     ],
 )
 def test_other_slips_are_refused(refusal, line, complaint):
@@ -149,3 +154,19 @@ def test_the_small_study_has_the_impairments_of_the_full_one():
 
     assert varied("impairments-small") == varied("impairments")
     assert "clock_offset_s" in varied("impairments-small")
+
+
+def test_missions_are_written_and_compared(succeed, tmp_path):
+    for name, erasure in (("a", 0.0), ("b", 0.5)):
+        (tmp_path / "s.toml").write_text(f"{SMALL}{MISSION}erasure = {erasure}\n")
+        succeed("study", "run", "s.toml", "--parquet", f"{name}.parquet")
+    rows = pd.read_parquet(tmp_path / "a.parquet")
+    assert list(rows["policy"]) == ["mst", "mst", "round-robin", "round-robin"]
+    said = succeed("study", "compare", "a.parquet", "a.parquet").stdout
+    (age, _) = said.strip().split("\n\n")
+    head, columns, *lines = age.splitlines()
+    assert head.startswith("aoi, ")
+    assert columns.split()[:4] == ["policy", "before", "after", "difference"]
+    assert [line.split()[0] for line in lines] == ["mst", "round-robin"]
+    said = succeed("study", "compare", "a.parquet", "b.parquet").stdout
+    assert "erasure" in said.splitlines()[1]

@@ -1,0 +1,99 @@
+"""Missions as rows of Parquet, and their differences by hand."""
+
+import json
+from dataclasses import asdict, fields, replace
+
+import numpy as np
+import pandas as pd
+import pytest
+from pyarrow import parquet
+
+import swarm_mj
+from swarm_mj.evaluation.missions_table import compared, read_missions, write_missions
+from swarm_mj.mission import Mission, paper
+
+MISSION = paper("flocking", num_robots=5, num_windows=6, range_ratio=1.0)
+
+
+@pytest.fixture(scope="module")
+def flown():
+    """Three missions from seed 5, of two policies."""
+    return swarm_mj.evaluate(("mst", "tdma"), MISSION, num_missions=3, seed=5).results
+
+
+@pytest.fixture
+def written(flown, tmp_path):
+    """Writes missions of the first policy with these ages from a seed on; returns the file."""
+
+    def write(name, ages, seed=5, **fields):
+        result = replace(flown[0].result, seed=seed, config=json.dumps(asdict(MISSION) | fields))
+        own = replace(flown[0], result=result, aoi=ages, velocity_variance=ages, task_cost=None)
+        write_missions(tmp_path / name, [own])
+        return tmp_path / name
+
+    return write
+
+
+def test_a_file_has_a_row_for_each_mission_with_its_fields_and_the_study(flown, tmp_path):
+    path = tmp_path / "m.parquet"
+    write_missions(path, flown)
+    rows = pd.read_parquet(path)
+    assert list(rows["policy"]) == ["mst"] * 3 + ["tdma"] * 3
+    assert list(rows["seed"]) == [5, 6, 7] * 2
+    for cost in ("aoi", "velocity_variance", "task_cost"):
+        assert list(rows[cost]) == [x for each in flown for x in getattr(each, cost)]
+    for spec in fields(Mission):
+        (value,) = set(rows[spec.name].astype(object).where(rows[spec.name].notna(), None))
+        assert value == getattr(MISSION, spec.name), spec.name
+    study = json.loads(parquet.read_schema(path).metadata[b"study"])
+    assert (study["seed"], study["episodes"], study["baseline"]) == (5, 3, "mst")
+    assert study["version"] == flown[0].result.version
+    assert study["policies and regimes"] == [json.loads(each.result.config) for each in flown]
+    assert read_missions(path).equals(rows)
+
+
+def test_columns_have_kinds_even_where_no_mission_has_a_value(written):
+    kinds = parquet.read_schema(written("m.parquet", [1.0, 2.0, 3.0]))
+    assert {str(kinds.field(n).type) for n in ("bit_rate", "task_cost", "range_ratio")} == {
+        "double"
+    }
+    assert {str(kinds.field(n).type) for n in ("channel", "task", "policy")} == {"string"}
+    assert (str(kinds.field("seed").type), str(kinds.field("collide").type)) == ("int64", "bool")
+
+
+def test_differences_are_of_the_same_seeds_by_hand(written):
+    """Seeds 5 to 8 before, 6 to 9 after: of 6, 7 and 8 the differences are 1, 2 and 6."""
+    before = read_missions(written("a.parquet", [90.0, 10.0, 20.0, 30.0]))
+    after = read_missions(written("b.parquet", [11.0, 22.0, 36.0, 99.0], seed=6))
+    (row,) = compared(before, after, "aoi").to_dict("records")
+    assert (row["policy"], row["before"], row["after"], row["difference"]) == ("mst", 20, 23, 3)
+    assert 1.0 <= row["low"] < 3.0 < row["high"] <= 6.0
+    assert (row["missions"], row["only before"], row["only after"]) == (3, 1, 1)
+    assert compared(before, after, "task_cost").empty
+
+
+def test_regimes_are_told_apart_by_what_differs_and_those_that_one_lacks_are_shown(written):
+    paths = [written(f"{x}.parquet", [10.0, 12.0], erasure=x) for x in (0.0, 0.1, 0.3)]
+    none, some, much = map(read_missions, paths)
+    table = compared(pd.concat([none, some]), pd.concat([some, much]), "aoi")
+    assert list(table.columns[:2]) == ["erasure", "policy"]
+    assert list(table["erasure"]) == [0.0, 0.1, 0.3]
+    assert list(table["missions"]) == [0, 2, 0]
+    assert (list(table["only before"]), list(table["only after"])) == ([2, 0, 0], [0, 0, 2])
+    np.testing.assert_array_equal(table["before"], [11.0, 11.0, np.nan])
+    np.testing.assert_array_equal(table["difference"], [np.nan, 0.0, np.nan])
+
+
+def test_a_file_without_a_newer_field_had_its_default(written):
+    path = written("m.parquet", [1.0, 2.0])
+    older = pd.read_parquet(path).drop(columns="erasure")
+    older.to_parquet(path)
+    assert set(read_missions(path)["erasure"]) == {Mission().erasure}
+    newer = read_missions(written("n.parquet", [2.0, 4.0]))
+    assert list(compared(read_missions(path), newer, "aoi")["difference"]) == [1.5]
+
+
+def test_what_is_no_parquet_is_refused(tmp_path):
+    (tmp_path / "r.csv").write_text("policy\nmst\n")
+    with pytest.raises(ValueError, match=r"missions .*r\.csv: .*make them with --parquet"):
+        read_missions(tmp_path / "r.csv")
