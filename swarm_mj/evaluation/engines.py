@@ -22,7 +22,6 @@ from typing import Any, Protocol, runtime_checkable
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission.components import is_users
 from swarm_mj.policies.registry import stored_policies
-from swarm_mj.policies.stored import find_policy
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
 from swarm_mj.system.packages import code_digest, need
@@ -214,6 +213,8 @@ class EngineOptions:
             raise ValueError(f"address {self.address} is of a Ray cluster; add --engine ray")
         if self.engine == "ray":
             need("ray", "the engine ray")
+            from swarm_mj.policies.stored import find_policy  # not in the core
+
             files = [find_policy(path) for path in stored_policies(study.policies)]
             return Ray(num_jobs=self.jobs, address=self.address, files=files)
         if self.engine == "slurm":

@@ -41,10 +41,8 @@ def fly_study(
 ) -> None:
     """Fly the batches that `costs` lacks, into `costs` and where they are kept.
 
-    A bar on the console shows the progress.
-
-    Raises:
-        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
+    A bar on the console shows the progress. Raises KeyboardInterrupt by Ctrl-C; `costs` then has
+    all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     flown = (engine if left else Local()).run(fly_batch, [study.batches[index] for index in left])
