@@ -78,9 +78,8 @@ class Mission:
 
     A field with a help text (`options.toml`) is an option, too: `num_robots` is `--robots`.
 
-    Raises:
-        ValueError: A field is outside its range; the message names the value and the range.
-        TypeError: There is no such field; the message names the one most like it.
+    Raises ValueError for a field outside its range, and names the value and the range; TypeError
+    for an unknown field, and names the one most like it.
     """
 
     preset: str = _choice("paper", "preset", "IV-B", Preset)
