@@ -12,14 +12,13 @@ import pyarrow as pa
 from pyarrow import parquet
 
 from swarm_mj.evaluation.results import config_of
-from swarm_mj.evaluation.summary import Evaluated, bootstrap_interval
+from swarm_mj.evaluation.summary import COSTS, Evaluated, bootstrap_interval
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import CALLED_WITH
 from swarm_mj.system.fields import kind_of
 from swarm_mj.system.reading import open_file
 from swarm_mj.system.writing import write_bytes
 
-COSTS = ("aoi", "velocity_variance", "task_cost")
 KINDS = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 REGIME = {spec.name: kind_of(spec) for spec in fields(Mission)} | dict.fromkeys(CALLED_WITH, str)
 STUDY = ("version", "commit", "episodes", "seed", "baseline")  # with all policies and regimes

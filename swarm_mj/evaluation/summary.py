@@ -20,7 +20,7 @@ from swarm_mj.policies.registry import flown_name
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.writing import write_json
 
-COSTS = ("aoi", "velocity_variance")  # of each mission
+COSTS = ("aoi", "velocity_variance", "task_cost")  # of each mission; only some have the last
 BATCH = 1000  # resamples at once: bounds the memory that many samples take
 ROUNDING = 1e-12  # samples that differ by no more than this share of their size are constant
 
@@ -37,7 +37,7 @@ class Evaluated:
     @property
     def row(self) -> dict[str, Any]:
         """The result's columns, and the missions' costs as lists."""
-        costs = {name: getattr(self, name) for name in (*COSTS, "task_cost")}
+        costs = {name: getattr(self, name) for name in COSTS}
         return asdict(self.result) | {f"episode_{n}": c for n, c in costs.items() if c is not None}
 
 
@@ -129,7 +129,7 @@ def _result(
 
 def _costs(costs: BatchCosts) -> dict[str, Any]:
     columns: dict[str, Any] = {}
-    for name in COSTS:
+    for name in ("aoi", "velocity_variance"):
         figures = spread(getattr(costs, name))
         columns |= {f"{name}_{figure}": value for figure, value in figures.items()}
     for name in ("aoi_steady", "aoi_floor", "task_cost", "task_cost_last"):
@@ -168,7 +168,7 @@ def _packets(costs: BatchCosts, regime: Mission, num_bytes: int) -> dict[str, An
 def _differences(costs: BatchCosts, baseline: BatchCosts) -> dict[str, float | None]:
     """Return paired differences, mission by mission; nothing of the baseline to itself."""
     columns: dict[str, float | None] = {}
-    for cost in (*COSTS, "task_cost"):
+    for cost in COSTS:
         difference = getattr(costs, cost) - getattr(baseline, cost)
         if costs is not baseline and not np.isnan(difference).any():
             low, high = bootstrap_interval(difference)
