@@ -11,7 +11,7 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from dataclasses import dataclass
-from functools import partial
+from functools import cache, partial
 from importlib import import_module
 from itertools import islice
 from multiprocessing import get_context, resource_tracker
@@ -170,10 +170,13 @@ def _finished(jobs: Sequence[Any], completed: Iterable[Any]) -> Done:
                 job.cancel(check=False)
 
 
+_worker_code = cache(code_digest)  # a worker hashes its code once, not once a piece
+
+
 def _do(work: Work, code: str, share: Sequence[tuple[int, Any]]) -> list[Any] | Exception:
     """Return pieces' indices and products in another process, or what went wrong."""
-    if code_digest() != code:
-        other = f"{socket.gethostname()} has other code, digest {code_digest():.12}"
+    if _worker_code() != code:
+        other = f"{socket.gethostname()} has other code, digest {_worker_code():.12}"
         return OSError(f"{other}, not {code:.12} as here; install the same on all machines")
     try:
         return [(index, work(piece)) for index, piece in share]
