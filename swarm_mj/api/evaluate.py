@@ -171,8 +171,9 @@ def evaluate(
         features=(features,) if isinstance(features, str) else tuple(features),
         components=Components(**components),
     )
-    flies = EngineOptions(jobs=num_jobs, engine=engine, address=address).engine_for(study)
-    needs = study_needs(study, num_jobs if engine == "local" else 1)
+    options = EngineOptions(jobs=num_jobs, engine=engine, address=address)
+    flies = options.engine_for(study)
+    needs = study_needs(study, options.jobs_here)
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(needs, None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}

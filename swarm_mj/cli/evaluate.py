@@ -114,7 +114,7 @@ def fly(options: StudyFlags, study: Study) -> int:
     inputs = registry.stored_policies(study.policies)
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
-    needs = study_needs(study, options.jobs if options.engine == "local" else 1)
+    needs = study_needs(study, options.jobs_here)
     check_fits(needs, next(iter(options.files), None), way_out, is_forced=options.yes)
     with ExitStack() as stack:
         for path in options.files:
@@ -125,7 +125,7 @@ def fly(options: StudyFlags, study: Study) -> int:
 def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     """Fly the rest of a study, and write its results; `kept` is the progress file."""
     engine = options.engine_for(study)
-    tell_cores(options.jobs if options.engine == "local" else 1)
+    tell_cores(options.jobs_here)
     console = Console(stderr=True, highlight=False)
     if study.pairs != list(product(study.regimes, study.policies)):
         console.print(registry.FLOWN_AS)

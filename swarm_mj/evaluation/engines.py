@@ -49,11 +49,8 @@ class Engine(Protocol):
         """Do all pieces; yield each one's index and product once, in the order they are done.
 
         The processes import `work`; pieces and products are pickled on the way. They end with the
-        generator, and with this process, however it ends.
-
-        Raises:
-            OSError: Not all pieces could be done.
-            Exception: What `work` raised of the first piece that failed.
+        generator, and with this process, however it ends. Raises OSError if not all pieces could
+        be done, or what `work` raised of the first that failed.
         """
         ...
 
@@ -209,6 +206,11 @@ class EngineOptions:
     engine: str = setting("local", "who starts them", choices=("local", "ray", "slurm"), **GROUP)
     address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", **GROUP)
 
+    @property
+    def jobs_here(self) -> int:
+        """How many processes fly on this machine, as far as is known."""
+        return self.jobs if self.engine == "local" else 1
+
     def engine_for(self, study: Study) -> Engine:
         """Return the engine; raise ValueError for what is not known or does not fit."""
         check(self)
@@ -220,11 +222,12 @@ class EngineOptions:
 
             files = [find_policy(path) for path in stored_policies(study.policies)]
             return Ray(num_jobs=self.jobs, address=self.address, files=files)
-        if self.engine == "slurm":
-            need("submitit", "the engine slurm")
-            if not shutil.which("sbatch"):
-                raise OSError("there is no sbatch here; --engine slurm needs a machine that has it")
-        return (Slurm if self.engine == "slurm" else Local)(num_jobs=self.jobs)
+        if self.engine == "local":
+            return Local(num_jobs=self.jobs)
+        need("submitit", "the engine slurm")
+        if not shutil.which("sbatch"):
+            raise OSError("there is no sbatch here; --engine slurm needs a machine that has it")
+        return Slurm(num_jobs=self.jobs)
 
 
 @contextmanager
