@@ -12,8 +12,9 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.evaluate import study_needs
+from swarm_mj.cli import EPILOGS, OPTIONS
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
-from swarm_mj.cli.options import output_option
+from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.engines import EngineOptions
@@ -24,42 +25,26 @@ from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
-from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.fields import common_setting, same_as
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, owned
 
+HELP = OPTIONS["evaluate"]
+
 
 @dataclass(frozen=True, kw_only=True)
 class StudyFlags(EngineOptions):
     """How a study is flown, and where its results go."""
 
-    EPILOG: ClassVar = (
-        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json, "
-        "--csv or --parquet, --resume continues)."
-    )
-    json: Path | None = output_option(
-        None, "write all figures and each mission's costs", metavar="FILE.json", is_common=True
-    )
-    csv: Path | None = output_option(
-        None, "write all figures, one row a result", metavar="FILE.csv", is_common=True
-    )
-    parquet: Path | None = output_option(
-        None, "write each mission's costs, one row a mission", metavar="FILE.parquet"
-    )
-    plot: Path | None = output_option(
-        None,
-        "draw the policies' ages, the lowest first",
-        metavar="FILE.png|.svg|.pdf",
-        is_common=True,
-    )
-    wide: bool = output_option(
-        False,
-        "print more columns: velocity variance, quantiles, bytes, published values",
-        is_common=True,
-    )
+    EPILOG: ClassVar = EPILOGS["evaluate"]
+    json: Path | None = common_output(None, HELP["json"], metavar="FILE.json")
+    csv: Path | None = common_output(None, HELP["csv"], metavar="FILE.csv")
+    parquet: Path | None = output_option(None, HELP["parquet"], metavar="FILE.parquet")
+    plot: Path | None = common_output(None, HELP["plot"], metavar="FILE.png|.svg|.pdf")
+    wide: bool = common_output(False, HELP["wide"])
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)
     resume: bool = output_option(False, "continue where an interruption broke off")
@@ -74,9 +59,7 @@ class StudyFlags(EngineOptions):
 class EvaluateOptions(StudyFlags, PolicyOptions):
     """The options of `swarm-mj evaluate`."""
 
-    policy: tuple[str, ...] = setting(
-        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", is_common=True
-    )
+    policy: tuple[str, ...] = common_setting(DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}")
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")
     baseline: str | None = same_as(Study, "baseline")

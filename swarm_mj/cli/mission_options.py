@@ -7,6 +7,7 @@ from functools import partial
 from itertools import product
 from typing import Any
 
+from swarm_mj.cli import OPTIONS
 from swarm_mj.cli.options import flags_of, nested, nested_option
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.mission.components import GROUP, SHOWN_AS, Components
@@ -14,6 +15,7 @@ from swarm_mj.mission.presets import NEEDED
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
+HELP = OPTIONS["policies"]
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
@@ -30,20 +32,10 @@ USUAL = paper("flocking"), paper("stationary")  # whose defaults are shown
 class PolicyOptions(Components):
     """Options that change a policy, or what it flies in."""
 
-    probability: float | None = _policy(
-        None, "of a transmission, for policies that have one", low=0.0, high=1.0, shown=TUNED
-    )
-    is_deterministic: bool = _policy(
-        False, "learned policies take the most probable recipient, not a draw"
-    )
-    payload: str = _policy(
-        "snapshots",
-        "what the planner's packets carry beyond T, M and P; in stationary teams, links",
-        choices=PAYLOADS,
-    )
-    features: tuple[str, ...] = setting(
-        (), "that a learned policy was trained on; give them again", group=GROUP, metavar=SHOWN_AS
-    )
+    probability: float | None = _policy(None, HELP["probability"], low=0.0, high=1.0, shown=TUNED)
+    is_deterministic: bool = _policy(False, HELP["deterministic"])
+    payload: str = _policy("snapshots", HELP["payload"], choices=PAYLOADS)
+    features: tuple[str, ...] = setting((), HELP["features"], group=GROUP, metavar=SHOWN_AS)
 
     @property
     def components(self) -> Components:

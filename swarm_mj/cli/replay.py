@@ -13,7 +13,6 @@ from swarm_mj.cli import OPTIONS
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay import view
-from swarm_mj.replay.view import run as run_viewer
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
@@ -34,9 +33,7 @@ HELP = OPTIONS["replay"]
 class ReplayOptions:
     """The options of `swarm-mj replay`."""
 
-    file: tuple[Path, ...] = setting(
-        help=".rrd files that `swarm-mj fly` recorded", is_positional=True
-    )
+    file: tuple[Path, ...] = setting(help=HELP["file"], is_positional=True)
     web: bool = setting(False, HELP["web"])
     video: Path | None = setting(None, HELP["video"], group=VIDEO)
     picture: Path | None = setting(
@@ -51,9 +48,7 @@ class ReplayOptions:
     seconds: float | None = _video(
         None, "in which the whole mission is shown", unit="s", low=0.1, high=600.0, shown=OWN_TIME
     )
-    fps: int | None = _video(
-        None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
-    )
+    fps: int | None = _video(None, HELP["fps"], low=1, high=60, shown="25; GIF: 15")
     scene: str | None = _video(None, HELP["scene"], metavar=SHOWN_AS, shown=BARE)
     force: bool = _video(False, "replace an existing video or picture")
     yes: bool = _video(False, "ignored: videos are made without an estimate")
@@ -71,10 +66,10 @@ def run(options: ReplayOptions) -> int:
     for file in options.file:
         check_replay(file)
     if not options.web:
-        return run_viewer(view.view_command(*options.file))
+        return view.run(view.view_command(*options.file))
     command, address = view.serve_command(*options.file)
     plain_console().print(f"Open {address}\nCtrl-C ends it.")
-    return run_viewer(command)
+    return view.run(command)
 
 
 def _check_together(options: ReplayOptions) -> None:

@@ -5,6 +5,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, get_origin
 
+from swarm_mj.cli import EPILOGS, OPTIONS
 from swarm_mj.cli.evaluate import StudyFlags, fly
 from swarm_mj.cli.mission_options import missions_of
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
@@ -25,17 +26,10 @@ TAKES = {"run": "FILE.toml", "compare": "BEFORE.parquet AFTER.parquet"}
 class StudyOptions(StudyFlags):
     """The options of `swarm-mj study`."""
 
-    EPILOG: ClassVar = (
-        "FILE.toml has tables of fields: [study] (policies, episodes, seed, baseline), [mission] "
-        "(of Mission in Python; of several values, each is flown) and [missions.NAME], which adds "
-        f"missions of its own. {StudyFlags.EPILOG}"
-    )
+    EPILOG: ClassVar = f"{EPILOGS['study']} {StudyFlags.EPILOG}"
     action: str = setting(help="run or compare", choices=tuple(TAKES), is_positional=True)
     named: tuple[str, ...] = setting(
-        help="a study to run, FILE.toml or a shipped one's name; or two results to compare, each "
-        "written by --parquet",
-        metavar="FILE",
-        is_positional=True,
+        help=OPTIONS["study"]["named"], metavar="FILE", is_positional=True
     )
 
 

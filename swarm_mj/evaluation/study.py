@@ -14,11 +14,10 @@ from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Parameters, Policy
-from swarm_mj.system.fields import check, setting
+from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.packages import code_digest, commit, version
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
-MAX_EPISODES = 100_000
 BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption
 
 
@@ -31,22 +30,17 @@ class Study:
 
     policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones
     regimes: tuple[Mission, ...]
-    episodes: int = setting(
-        100, "missions of each policy in each regime", low=1, high=MAX_EPISODES, is_common=True
-    )
-    seed: int = setting(
-        1000, "seed of the first mission; the others follow one by one", is_common=True
-    )
+    episodes: int = common_setting(100, "missions of each policy in each regime", low=1, high=10**5)
+    seed: int = common_setting(1000, "seed of the first mission; the others follow one by one")
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
     features: tuple[str, ...] = ()  # users' own extractors that learned policies may load
     components: Components = Components()
-    baseline: str | None = setting(
+    baseline: str | None = common_setting(
         None,
         "whom the others are compared to, mission by mission",
         metavar="POLICY",
         shown="the first policy",
-        is_common=True,
     )
 
     def __post_init__(self) -> None:

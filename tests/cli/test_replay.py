@@ -19,7 +19,7 @@ def test_replay_opens_a_window_or_says_where_a_browser_goes(web, monkeypatch, ca
     """The viewer ends with 3, and so does the command."""
     opened = []
     monkeypatch.setattr("swarm_mj.replay.read.check_replay", lambda _: None)
-    monkeypatch.setattr(replay, "run_viewer", lambda command: opened.append(command) or 3)
+    monkeypatch.setattr(replay.view, "run", lambda command: opened.append(command) or 3)
     monkeypatch.setenv("DISPLAY", ":0")
     assert main(["replay", "some.rrd", *(["--web"] if web else [])]) == 3
     (command,), said = opened, capsys.readouterr().out
