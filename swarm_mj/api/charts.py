@@ -35,10 +35,7 @@ def draw_flight(
     window_s: float,
     own_cost: tuple[str, str] | None,
 ) -> Figure:
-    """Return a chart of a mission's costs over its windows, in the policy's colour.
-
-    `own_cost` is the name and the unit of the task's cost, if it has one.
-    """
+    """Chart a mission's costs over its windows; `own_cost` is the task cost's name and unit."""
     colour = look_of(policy).colour
     number = 2 if own_cost else 1
     with style.styled():

@@ -125,11 +125,7 @@ def fly(
 def mission_of(
     function: Callable[..., Any], task: str | Mission | None, mission_fields: Mapping[str, Any]
 ) -> Mission:
-    """Return the mission that a function's arguments name: a task's, or a finished one.
-
-    It raises TypeError for a field that no mission has, which may have been meant for any keyword
-    of the function, and for fields beside a finished mission.
-    """
+    """Return the mission that a function's arguments name; TypeError for fields it cannot have."""
     parameters = inspect.signature(function).parameters.values()
     keywords = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     names = [spec.name for spec in fields(Mission) if spec.name != "task"]

@@ -34,10 +34,7 @@ POINTS_PER_IN = 72.0
 
 
 def draw_picture(footage: Footage, window: int | None = None) -> Figure:
-    """Return a map of one window, 16 by 9; the last unless given, 1 is a mission's first.
-
-    Raises ValueError if there is no such window.
-    """
+    """Return a map of one window, 16 by 9, the last unless given; ValueError if there is none."""
     row = _row(footage, window)
     with styled():
         figure = plt.figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI)

@@ -31,11 +31,7 @@ OPTIONS: dict[str, dict[str, str]] = _TEXTS["options"]  # what they mean, by com
 
 
 def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
-    """Return the function to run for the arguments after `swarm-mj`, and its options.
-
-    Raises ValueError if a value is unknown or outside its range, and SystemExit if the line cannot
-    be read, or only help was asked for.
-    """
+    """Return the function to run for the arguments, and its options; raise as `parse_options`."""
     if not arguments or arguments[0] not in COMMANDS:
         _show_or_refuse(arguments)
     from rich.console import Console
@@ -79,10 +75,7 @@ def end_process() -> NoReturn:
 def script(
     kind: type[Any], run: Callable[[Any], int], arguments: Sequence[str] | None = None
 ) -> int:
-    """Run a separate program, such as those of `tools/`, as `main` does a command.
-
-    `kind` is the dataclass of its options; the docstring of that module says what it does.
-    """
+    """Run a program such as those of `tools/`, by its options, as `main` runs a command."""
     from swarm_mj.cli.options import parse_options
 
     module = sys.modules[kind.__module__]

@@ -147,14 +147,10 @@ def _replay_path(options: FlyOptions) -> Path | None:
 
 
 def _fresh_name(options: FlyOptions) -> Path:
-    """Return a name of this process's own, for flights that start in the same second.
-
-    Of a learned policy it has the file's name without the path: `x` of runs/x/policy.safetensors
-    and of runs/x.
-    """
+    """Return a name of this process's own, for flights that start in the same second."""
     policy = options.policy.replace(" --", "-").replace(" ", "-").replace(":", "-")
     if registry.is_stored(options.policy):
         path = Path(options.policy.removesuffix(SUFFIX)).resolve()
-        policy = path.parent.name if path.name == "policy" else path.name
+        policy = path.parent.name if path.name == "policy" else path.name  # x of runs/x
     when = f"{datetime.now():%Y%m%d-%H%M%S}-{os.getpid()}"
     return REPLAYS / f"{options.mission.task}-{policy}-seed{options.seed}-{when}.rrd"

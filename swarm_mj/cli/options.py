@@ -93,8 +93,7 @@ def nested(
 def nested_option(spec: Field[Any], place: str, **about: Any) -> Field[Any]:
     """Return a field of a nested dataclass as an option; its value is parsed as `place`.
 
-    `about` overrides the field's own metadata; `is_many` has it take several
-    values, after one flag or several.
+    `about` overrides the field's own metadata; `is_many` has it take several values.
     """
     option = copy(spec)
     option.metadata = MappingProxyType({**spec.metadata, "place": place, **about})

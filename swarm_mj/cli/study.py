@@ -54,10 +54,7 @@ def run(options: StudyOptions) -> int:
 
 
 def read_study(name: str) -> Study:
-    """Return the study of a TOML file, or of one that is shipped, by its name.
-
-    Raises ValueError for a file that cannot be read, an unknown key, and as `Study` and `Mission`.
-    """
+    """Return the study of a TOML file, or a shipped one by its name; ValueError for a bad one."""
     shipped = {each.stem: each for each in asset("studies").glob("*.toml")}
     path = shipped.get(name, Path(name))
     if path.suffix != ".toml":

@@ -45,10 +45,7 @@ class Costed(Protocol):
 
 
 def costed(controller: Controller) -> Costed | None:
-    """Return a controller that has a task cost, or None.
-
-    Raises TypeError if it has a cost without a name or a unit.
-    """
+    """Return a controller that has a task cost, or None; TypeError if it lacks name or unit."""
     if isinstance(controller, Costed):
         return controller
     if hasattr(controller, "cost"):

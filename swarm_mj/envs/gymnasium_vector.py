@@ -98,11 +98,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     def step(
         self, actions: np.ndarray
     ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
-        """Fly one window of every mission; `actions[b, i]` is that of robot i.
-
-        Raises ValueError if a recipient is no robot, there is not one per robot, or a mission is
-        over and nothing begins it anew.
-        """
+        """Fly a window of each mission; `actions[b, i]` is robot i's; raises as `SwarmEnv.step`."""
         actions = np.asarray(actions)
         self._check_step(actions)
         reward = np.zeros(self.num_envs)

@@ -35,10 +35,7 @@ FIRST_TRAINING_SEED, LAST_TRAINING_SEED = 2**40, 2**62
 
 
 class MissionBatch:
-    """B missions of one team size that begin and end together.
-
-    Index order: `[b, i]` is robot `i` of mission `b`.
-    """
+    """B missions of one team size that begin and end together; `[b, i]` is robot i of mission b."""
 
     def __init__(
         self,
@@ -51,10 +48,7 @@ class MissionBatch:
         components: Components = Components(),
         keeps_recipients: bool = False,
     ) -> None:
-        """Take the missions, which `restart` begins; arguments as in `options.make_batch`.
-
-        With `keeps_recipients`, a mission under way can be flown again, by checkpoints.
-        """
+        """Take arguments as of `make_batch`; `keeps_recipients` lets checkpoints fly it again."""
         self.mission, self.num_missions = mission, num_missions
         self.shape = (num_missions, mission.num_robots)  # B N
         self.features, self.reward, self.with_parents = features, reward, with_parents
@@ -179,10 +173,7 @@ class MissionBatch:
 
 
 def seeds_from(first: int | None, number: int) -> list[int | None]:
-    """Return seeds that count on from the first one, which stays as it is; None for missions drawn.
-
-    What is no whole number reaches the checks of seeds, rather than being made one.
-    """
+    """Return seeds that count on from the first, kept as it is; None: missions are drawn."""
     return [first, *(None if first is None else first + n for n in range(1, number))]
 
 

@@ -39,10 +39,9 @@ def fly_study(
     keep: Callable[[int, BatchCosts], None] | None,
     console: Console,
 ) -> None:
-    """Fly the batches that `costs` lacks, into `costs` and where they are kept.
+    """Fly the batches that `costs` lacks, into `costs` and where they are kept; a bar shows it.
 
-    A bar on the console shows the progress. Raises KeyboardInterrupt by Ctrl-C; `costs` then has
-    all batches that were flown.
+    Raises KeyboardInterrupt by Ctrl-C; `costs` then has all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     flown = (engine if left else Local()).run(fly_batch, [study.batches[index] for index in left])

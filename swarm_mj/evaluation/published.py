@@ -138,10 +138,7 @@ SWEEPS = {figure.task: figure for figure in _ALL.values() if figure.sweeps_missi
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """Return what the paper reports for a policy in a regime, by cost, if it does.
-
-    It does only where the regime is its preset's in all that the figure does not sweep.
-    """
+    """Return what the paper reports for a policy, by cost, if only x differs from its preset."""
     if policy not in BASELINES or mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}
     sweep = SWEEPS[mission.task]

@@ -42,11 +42,7 @@ class Evaluated:
 
 
 def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:
-    """Write what `write_results` does into a .csv, and what each mission cost, too, into a .json.
-
-    A file that exists is replaced. JSON is `{"results": [...]}`; what does not exist is null. A
-    .parquet has a row for each mission.
-    """
+    """Write results as .csv, results and each mission's costs as .json, or missions as .parquet."""
     ending = path.suffix.lower()
     if ending == ".csv":
         write_results(path, [each.result for each in evaluated])
@@ -63,8 +59,7 @@ def study_results(
 ) -> list[Evaluated]:
     """Return the results of a study, regime by regime, policy by policy.
 
-    `costs` are those of all batches, by their index in `study.batches`, in any order; `made_by`
-    has the code's `version` and `commit` when the first of them began.
+    `costs` are by the index in `study.batches`; `made_by` has the code's `version` and `commit`.
     """
     batches: dict[tuple[Mission, str], list[BatchCosts]] = {pair: [] for pair in study.pairs}
     for index, batch in enumerate(study.batches):

@@ -33,10 +33,7 @@ def results_text(results: Sequence[Result]) -> str:
 def print_results(
     results: Sequence[Result], file: io.StringIO | None = None, *, is_wide: bool = False
 ) -> None:
-    """Print a table per regime, whose results stand together; plain text into a file.
-
-    It has the age, its difference to the baseline's and the share heard; a wide one has all.
-    """
+    """Print a table per regime; a wide one has all columns. A file gets plain text."""
     how: dict[str, Any] = {"file": file, "force_terminal": None if file is None else False}
     how |= {"force_jupyter": False, "highlight": False, "markup": False}
     console = Console(**how)

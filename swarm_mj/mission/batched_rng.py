@@ -64,10 +64,7 @@ class Started(Protocol):
 
 
 class Stream:
-    """The same kind of draw from every mission's own generator, one array for all missions.
-
-    Mission b sees the numbers that its generator alone would give, whatever the batch.
-    """
+    """One array of draws, each mission's from its own generator, whatever missions are with it."""
 
     def __init__(
         self, rngs: Sequence[np.random.Generator], draw: Draw, shape: tuple[int, ...]

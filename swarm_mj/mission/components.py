@@ -72,10 +72,7 @@ class Components:
         return "".join(f", {kind} {name}" for kind, name in self.names.items())
 
     def made(self, mission: Mission) -> "Components":
-        """Return the components as objects; raise ValueError as `make`.
-
-        A named channel must not replace what the mission asks for.
-        """
+        """Return objects; raise as `make`, or for a channel that replaces what is asked for."""
         named = {kind: each for kind, each in self.given.items() if isinstance(each, str)}
         if "channel" in named and beyond_free_space(mission):
             raise ValueError(

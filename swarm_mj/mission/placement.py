@@ -105,10 +105,7 @@ def _area(half_side_m: float) -> str:
 def draw_survivors(
     mission: Mission, rngs: Sequence[np.random.Generator]
 ) -> Bool[np.ndarray, "B N"] | None:
-    """Return who is active in the second half of the missions; None if nobody fails.
-
-    As many robots fail in every mission; `rngs` has one generator per mission.
-    """
+    """Return who is active in the second half, as many in each mission; None if nobody fails."""
     if mission.num_failures == 0:
         return None
     is_active = np.ones((len(rngs), mission.num_robots), dtype=np.bool_)

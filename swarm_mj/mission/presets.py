@@ -41,10 +41,7 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:
 
 
 def world(preset: str, task: Task = "random-walk", **overrides: Any) -> Mission:
-    """Return a mission of the paper's text in an arena of `WORLDS`, with the channel of that arena.
-
-    Other arguments as of `paper`. Robots walk by default, as a stationary team stays connected.
-    """
+    """Return a mission in an arena of `WORLDS`, with its channel; arguments as of `paper`."""
     return paper(task, **({"preset": preset} | WORLDS[preset] | overrides))
 
 

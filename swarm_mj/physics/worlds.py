@@ -33,10 +33,7 @@ class Physics:
         scene: Scene | None = None,
         num_threads: int = 1,
     ) -> None:
-        """Compile the scene and make B worlds, stepped by MuJoCo's threads.
-
-        Raises ValueError if the scene changed the robots, or MuJoCo rejects it.
-        """
+        """Compile the scene, make B worlds; ValueError if it changes robots or does not compile."""
         self._mission = mission
         try:
             self._model = compose(mission, scene=scene).compile()
@@ -74,10 +71,7 @@ class Physics:
         self.states = replace(self.states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
-        """Move all robots through one window, with u clipped to plus or minus A_max (Eq. 15).
-
-        Raises ValueError unless there is one finite acceleration per robot.
-        """
+        """Move all robots one window on, u clipped to A_max (Eq. 15); ValueError for a wrong u."""
         self._check_accelerations(acceleration_mps2)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)

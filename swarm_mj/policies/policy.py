@@ -33,10 +33,7 @@ class Policy:
         return ()
 
     def packet(self, mission: Mission) -> Packet:
-        """Return what a packet holds: the sender's buffer, or as much of it as a slot has room for.
-
-        Raises ValueError if a slot does not even hold one entry and the payload.
-        """
+        """Return the packet, with all entries that a slot holds; ValueError if it holds none."""
         packet = packet_of(mission, self.payload_fields(mission))
         return fitting(packet, mission, type(self).__name__)
 
@@ -89,10 +86,7 @@ class BroadcastPolicy(DecentralisedPolicy):
         """Return who broadcasts in the next slot; [b, i] may depend on view [b, i] only."""
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Return `BROADCAST` for robots that transmit; the others address themselves.
-
-        Raises ValueError if `transmits`, which may be a user's own, is not a bool per robot.
-        """
+        """Return `BROADCAST` for robots that transmit; ValueError if `transmits` is not bools."""
         transmits = np.asarray(self.transmits(views))
         shape = views.silence.shape
         if transmits.shape != shape or transmits.dtype != np.bool_:

@@ -189,10 +189,7 @@ def flown_name(name: str, mission: Mission) -> str:
 
 
 def with_payload(names: Sequence[str], payload: str) -> list[str]:
-    """Return the names of policies whose packets carry this beyond T, M and P, where they can.
-
-    Raises ValueError if no policy can go without.
-    """
+    """Return the names of policies with this payload; ValueError if none of them has a choice."""
     if payload == "snapshots":
         return list(names)
     if not {"planner", WITHOUT_PAYLOAD} & set(names):

@@ -138,10 +138,7 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
 
 
 def find_policy(path: Path) -> Path:
-    """Return where a policy is: the file `path` or `path.safetensors`, or that in a run's folder.
-
-    `runs/mine` and `runs/mine/policy` name the policy of a run; ValueError if there is none.
-    """
+    """Return the file `path`, `path.safetensors` or that in a run's folder; ValueError for none."""
     for place in (path, Path(f"{path}{SUFFIX}"), path / POLICY):
         if os.path.isfile(place):
             return place

@@ -16,10 +16,7 @@ from swarm_mj.system.fields import name_of
 def check_robots(
     what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
 ) -> None:
-    """Raise ValueError unless there is one robot chosen per robot of these B missions.
-
-    `what` names the choice in the message; `BROADCAST` may be a choice, too.
-    """
+    """Raise ValueError, naming `what`, unless each robot of B missions has chosen one robot."""
     if robots.shape != shape:
         raise ValueError(f"{what} must have shape {shape}, missions by robots, not {robots.shape}")
     if robots.dtype.kind not in "iu":

@@ -142,10 +142,7 @@ def check_fits(
 
 
 def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
-    """Return a policy's whole packet with as many entries as a slot of the mission holds.
-
-    Raises ValueError if that is less than the payload and one entry.
-    """
+    """Return a packet with the entries that a slot holds; ValueError if it holds not even one."""
     capacity = slot_bytes(mission)
     if capacity is None or fits(packet, mission):
         return packet

@@ -37,10 +37,7 @@ def merge_timestamps(
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
 ) -> float:
-    """Merge what everyone decoded into every receiver's T, as in Eq. 8; return the sum of rises.
-
-    A packet is T of its sender before the slot.
-    """
+    """Merge senders' T of before the slot into receivers' (Eq. 8); return the sum of rises."""
     total = 0.0
     for i in range(heard.shape[0]):
         j = heard[i]

@@ -108,8 +108,7 @@ class ComposedChannel:
     ) -> Bool[np.ndarray, "N"]:
         """Return the largest group of a mission's robots in which everyone reaches everyone.
 
-        Links are those whose packets decode in silence and without fades. Of groups that are
-        equally large, it is the one with the first robot.
+        Links are those that decode in silence, without fades; of equal groups it is the first.
         """
         rule = self.reception
         is_linked = self.mean_powers_mw(position_m, mission) >= rule.noise_mw * rule.threshold
@@ -118,10 +117,7 @@ class ComposedChannel:
 
 
 def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
-    """Return the first member of each robot's group, within which everyone reaches everyone.
-
-    Links go from row to column, so groups are the graph's strongly connected components.
-    """
+    """Return the first of each robot's strongly connected component; links go row to column."""
     from scipy.sparse.csgraph import connected_components  # slow to import
 
     _, label = connected_components(is_linked, connection="strong")

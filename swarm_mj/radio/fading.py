@@ -148,10 +148,7 @@ def draw_waves(
 
 @compiled()
 def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) -> None:
-    """Bring the ends of mission b's waves to where its robots are.
-
-    Cosines and sines cost more than all else here, so they are computed once for each place.
-    """
+    """Bring mission b's waves to where its robots are; cosines, which cost most, once a place."""
     first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
     for i in range(position_m.shape[0]):
         x = np.floor(position_m[i, 0] / waves.step_m + 0.5)

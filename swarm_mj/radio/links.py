@@ -153,10 +153,7 @@ def chance_of_strongest(links: Links, incoming: Incoming, j: int) -> float:
 
 @compiled(forceinline=True)
 def room_for_interference(links: Links, incoming: Incoming, j: int) -> float:
-    """Return what interference must exceed to ensure that j decodes nothing [mW].
-
-    That allows for rounding. It is inf where there are curves, which reach far.
-    """
+    """Return what interference silences j for certain, rounding included [mW]; inf with curves."""
     if links.curves.shape[0] > 0:
         return np.inf
     certain = CERTAIN / links.distance_over_std[incoming.sender, j] + ROUNDING

@@ -28,10 +28,7 @@ def obstruct(
     obstacles: Obstacles | None,
     power: Float[np.ndarray, "N"],
 ) -> None:
-    """Multiply the power of i's packets at every other robot by what obstacles leave of it.
-
-    The robots' antennas are at this height above the floor [m].
-    """
+    """Multiply i's power at all others by what obstacles leave, at the antennas' height [m]."""
     if obstacles is None:  # code for obstacles is then not even compiled
         return
     x, y = position_m[i, 0], position_m[i, 1]
@@ -45,10 +42,7 @@ def obstruct(
 def blocked(
     position_m: Float[np.ndarray, "N 2"], height_m: float, radius_m: float, obstacles: Obstacles
 ) -> Bool[np.ndarray, "N"]:
-    """Return which robots of this radius touch an obstacle, by four lines across each.
-
-    Their centres are at this height above the floor [m].
-    """
+    """Return which robots, at this height [m], touch an obstacle, by four lines across each."""
     touches = np.zeros(position_m.shape[0], dtype=np.bool_)
     for i in range(position_m.shape[0]):
         for turn in range(4):

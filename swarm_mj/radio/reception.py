@@ -70,11 +70,7 @@ def add_packet(incoming: Incoming, i: int, signal: float, interference: float) -
 
 @compiled()
 def decoded(incoming: Incoming, j: int, noise: float, threshold: float, factor: float = 1.0) -> int:
-    """Return the sender whose packet j decodes, or j itself: nobody.
-
-    A prediction that allows for more interference than it knows of scales it by `factor`. The
-    threshold is linear [1].
-    """
+    """Return the sender that j decodes, or j: nobody; `factor` allows for more interference."""
     # The total less the signal, not a second sum: loops stay linear in the senders, and all callers
     # round alike, so that predictions agree with the channel to the last digit.
     interference = factor * (incoming.total - incoming.strongest)

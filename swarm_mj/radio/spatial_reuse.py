@@ -85,10 +85,7 @@ def write_joined(
 def believes_as_the_last(
     believed_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"], i: int
 ) -> bool:
-    """Return whether robot i knows whom the robot before it knows, in the same places.
-
-    All that follows from beliefs alone is then the same: robots at rest need it once.
-    """
+    """Return whether robot i believes what the one before it does: beliefs then decide the same."""
     for k in range(is_known.shape[0] if i > 0 else 0):
         x_is_same = believed_m[i, k, 0] == believed_m[i - 1, k, 0]
         y_is_same = believed_m[i, k, 1] == believed_m[i - 1, k, 1]

@@ -146,11 +146,7 @@ def stride_of(swarm: Swarm, min_stride: int = 1) -> int:
 
 
 def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
-    """Compare one mission's channel with the belief about it.
-
-    There is nothing to compare in free space, where the belief is right, and in a user's own
-    channel, whose mean powers are unknown.
-    """
+    """Compare a mission's channel with the belief; None in free space, and for a user's own."""
     channel = swarm.truth.channel
     if channel is None:
         return None

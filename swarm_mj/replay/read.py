@@ -46,10 +46,7 @@ def _seal(recorded: memoryview) -> bytes:
 
 
 def check_replay(path: Path) -> None:
-    """Raise ValueError unless this is a file as `write_replay` left it; OSError if the disk fails.
-
-    Rerun may crash over others, so they are kept from it.
-    """
+    """Raise ValueError unless a file is as `write_replay` left it: rerun may crash over others."""
     with open_file(path, "replay") as file:
         content = file.read()
     if content[-SEAL_BYTES:] != _seal(memoryview(content)[:-SEAL_BYTES]):

@@ -163,10 +163,7 @@ class Recorder:
         return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *compared))
 
     def log(self, config: Mapping[str, Any] | None = None) -> Log:
-        """Return everything recorded so far; raise ValueError if that is nothing.
-
-        `config` names the policy, the seed and the user's components, for titles.
-        """
+        """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
         columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
@@ -246,10 +243,8 @@ def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
 def _age_spread(
     timestamp: Float[np.ndarray, "N N"], now: float, is_on: Bool[np.ndarray, "N"]
 ) -> tuple[float, float]:
-    """Return the standard deviation and the worst of ages between robots that are on [windows].
-
-    In loops: of thousands of robots, an array of all pairs takes a gigabyte.
-    """
+    """Return the standard deviation and the worst of ages between robots that are on [windows]."""
+    # In loops: of thousands of robots, an array of all pairs takes a gigabyte.
     num_pairs, total, oldest = 0, 0.0, -np.inf
     for i in np.flatnonzero(is_on):
         for j in range(len(is_on)):

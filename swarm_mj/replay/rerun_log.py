@@ -77,10 +77,7 @@ class RerunLog:
     def things(
         self, path: str, columns: rr.ComponentColumnList, row: Int[np.ndarray, "L"] | None = None
     ) -> None:
-        """Write things of any number in each window.
-
-        `row` is the log's window of each thing, ascending; None: each window has all robots.
-        """
+        """Write things by their windows, `row`, ascending; None: all robots in each window."""
         num = np.full(len(self.log.window), self.log.is_on.shape[1])
         per_window = num if row is None else np.bincount(row, minlength=len(num))
         self.timed(path, columns.partition(per_window))

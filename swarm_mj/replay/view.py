@@ -29,10 +29,7 @@ MIN_TICKS = 2  # viewers show what is shorter much longer
 
 
 def quiet_environment() -> dict[str, str]:
-    """Return this environment, changed so that rerun's viewer reaches this machine only.
-
-    The viewer says what fails, unless RUST_LOG asks for more: its notes name other addresses.
-    """
+    """Return an environment in which rerun's viewer is quiet, and reaches this machine only."""
     kept = {name: value for name, value in os.environ.items() if name.upper() not in REPLACED}
     return {"RUST_LOG": "error"} | kept | {"CI": "true", "ALL_PROXY": NOWHERE}
 

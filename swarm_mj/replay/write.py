@@ -35,11 +35,7 @@ HALO_M = 2.0  # height of what surrounds a robot that is cut off
 
 
 def write_replay(log: Log, config: Mapping[str, Any], path: Path) -> None:
-    """Write or replace a replay, which appears under its name only when it is whole.
-
-    `config` is kept in the file as recording properties: numbers, texts or booleans. Missing
-    folders are made. Raise OSError if the file cannot be written.
-    """
+    """Write a replay, whole or not at all, with `config` as its properties; or raise OSError."""
     # Rerun's own writer of files hides a full disk, or waits for space for good.
     recorded = with_digest(_recorded(log, config, path.stem))
     bindings.flush_and_cleanup_orphaned_recordings()  # its threads, which would stay

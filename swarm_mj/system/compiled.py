@@ -164,10 +164,7 @@ def compiling(say: Callable[[str], object]) -> AbstractContextManager[None]:
 
 
 def sources_digest(file: Path) -> str:
-    """Return a hash of a file and of all files that it imports, directly or through others.
-
-    Those are files of this package, and of the file's own: users compile loops across files, too.
-    """
+    """Return a hash of a file and all that it imports, directly or not, of its package and ours."""
     found, waiting = set(), [file]
     while waiting:
         path = waiting.pop()

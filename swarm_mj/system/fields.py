@@ -119,10 +119,7 @@ def did_you_mean(typed: object, known: Iterable[str]) -> str:
 
 
 def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
-    """Pass if all keywords given are known; raise TypeError in Python's words if one is not.
-
-    TorchRL, for one, reads these words: it tries options that an environment may not have.
-    """
+    """Raise TypeError, in Python's words, which TorchRL reads, for a keyword that is not known."""
     known = list(known)
     for name in given:
         if name not in known:

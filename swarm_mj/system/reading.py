@@ -25,10 +25,7 @@ MAX_LETTERS = 160  # of what msgspec says
 
 
 def open_file(path: Path, what: str) -> BinaryIO:
-    """Open a regular file, at once: pipes and devices would be waited for, or have no end.
-
-    Raises ValueError if it cannot be read.
-    """
+    """Open a regular file, or raise ValueError at once: a pipe might have no end."""
     try:
         number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
     except FileNotFoundError:
@@ -57,10 +54,7 @@ def check_size(what: str, size: int, most_bytes: int) -> None:
 
 
 def read_rows(path: Path, what: str, most_bytes: int) -> list[Row]:
-    """Return the rows of a CSV file, by the names of its columns, with the lines they end on.
-
-    Raises ValueError as `read_file` does, or if it is no CSV with as many cells as columns.
-    """
+    """Return a CSV file's rows by column, and the lines they end on; ValueError if it is none."""
     content = read_file(path, what, most_bytes)
     try:
         reader = csv.DictReader(io.StringIO(content.decode("utf-8-sig"), newline=""), strict=True)
@@ -79,10 +73,7 @@ def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
 
 
 def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) -> Kind:
-    """Read JSON as `read_json` does, of an object with a `format` and a `format_version`.
-
-    Raises ValueError as `read_json` does, or if it has another format, or a newer version of it.
-    """
+    """Read an object as `read_json`, if it has this `format` and no newer `format_version`."""
     document: Any = _plain(text)
     header = read_plain(document, _Header)
     if header.format != name:

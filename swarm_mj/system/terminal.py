@@ -65,10 +65,7 @@ def this_command(name: str = "swarm-mj") -> str:
 
 
 class WorkBar:
-    """A bar on the terminal while a `with` statement lasts; it leaves nothing behind.
-
-    It shows `what` is under way before the bar, and `text` behind it; both may change.
-    """
+    """A bar on the terminal within a `with`, between `what` and `text`, which may both change."""
 
     def __init__(
         self,
@@ -79,10 +76,7 @@ class WorkBar:
         completed: float | int = 0,
         console: Console | None = None,
     ) -> None:
-        """Prepare the bar, on standard error unless there is another console.
-
-        Without a unit, it shows no numbers; the time left is by the speed of late.
-        """
+        """Prepare the bar, on standard error by default; without a unit, it shows no numbers."""
         self.what, self.text = what, ""
         console = console or Console(stderr=True, highlight=False)
         count = f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"

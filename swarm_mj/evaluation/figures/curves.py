@@ -53,10 +53,7 @@ def preset_of(results: Sequence[Result]) -> str:
 
 
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
-    """Select the results of a figure, in their order; skip other regimes.
-
-    Raises ValueError if there are none, or they cannot be compared with each other or the paper.
-    """
+    """Select a figure's results, in order; ValueError for none, or for some that differ."""
     preset = preset_of(results)
     regime = figure.mission(preset)
     wanted = {name: getattr(regime, name) for name in ("task", *figure.fixed)}

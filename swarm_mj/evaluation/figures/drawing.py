@@ -209,10 +209,7 @@ def name_of(curve: Curve) -> str:
 
 
 def keep_apart(wanted: Float[np.ndarray, "L"], gap: float) -> Float[np.ndarray, "L"]:
-    """Return the places nearest to those wanted, in least squares, that keep their order and a gap.
-
-    They stand from 0 to 1, if there is room for all.
-    """
+    """Return the nearest places, in least squares, in their order, a gap apart, from 0 to 1."""
     order = np.argsort(wanted, kind="stable")
     steps = gap * np.arange(len(wanted))
     base = isotonic_regression(wanted[order] - steps).x

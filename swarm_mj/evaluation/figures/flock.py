@@ -20,11 +20,7 @@ ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
-    """Fly the preset's flock and draw its start and end, an arrow per robot (Fig. 2).
-
-    The colour is the distance of a robot's velocity from the team's mean. Raises ValueError for no
-    policy or no seed.
-    """
+    """Draw a flock's start and end (Fig. 2); ValueError for an unknown policy or a bad seed."""
     mission = PAPERS[preset]("flocking")
     policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
     start = swarm.states

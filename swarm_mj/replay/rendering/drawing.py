@@ -137,10 +137,7 @@ def draw_shortfalls(
     margin_db: Int16[np.ndarray, "K"],
     size: int,
 ) -> None:
-    """Write by how much links are too weak, each next to the robot at its far end.
-
-    `robots` are all robots' places in the picture, `others` those at the far ends [pixels].
-    """
+    """Write by how much links are too weak, next to the `others` at their far ends [pixels]."""
     small, shown = font(0.75 * size), np.zeros((0, 2, 2))
     on_robots = np.stack([robots - 0.4 * size, robots + 0.4 * size], axis=1)
     for robot, margin in zip(others.tolist(), margin_db.tolist(), strict=True):

@@ -27,10 +27,7 @@ WAY_OUT = (
 
 
 def make_context(width: int, height: int) -> Any:  # noqa: ANN401 - each back end has its own
-    """Return MuJoCo's `GLContext` to draw pictures of this size in.
-
-    Raise OSError if no OpenGL works here, or not the one that MUJOCO_GL names.
-    """
+    """Return MuJoCo's `GLContext` for pictures of this size; OSError if no OpenGL works here."""
     name = backend()
     try:
         return importlib.import_module(f"mujoco.{name}").GLContext(width, height)

@@ -43,10 +43,7 @@ class SceneRenderer(ExitStack):
     def __init__(
         self, mission: Mission, width: int = 1280, height: int = 720, *, scene: Scene | None = None
     ) -> None:
-        """Compile the scene, changed by `scene`, for pictures of this size [pixels].
-
-        Raise OSError if no OpenGL works here.
-        """
+        """Compile the scene for pictures of this size [pixels]; OSError if no OpenGL works here."""
         super().__init__()
         self._size, self._mission = (width, height), mission
         self._model = pictured(mission, scene, width, height)
@@ -138,10 +135,7 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
 
 
 class SceneViewer:
-    """MuJoCo's passive viewer, with robots and packets as pictures have them.
-
-    Closing the window ends the view, and nothing else.
-    """
+    """MuJoCo's passive viewer, with robots and packets; to close the window ends the view alone."""
 
     def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
         """Open the window; raise OSError without a display, or if it is closed already."""
