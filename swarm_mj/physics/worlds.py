@@ -71,7 +71,7 @@ class Physics:
         self.states = replace(self.states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
-        """Move all robots one window on, u clipped to A_max (Eq. 15); ValueError for a wrong u."""
+        """Move all robots one window on, u clipped to A_max; ValueError for a wrong u (Eq. 15)."""
         self._check_accelerations(acceleration_mps2)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)

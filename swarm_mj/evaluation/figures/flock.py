@@ -20,7 +20,7 @@ ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
-    """Draw a flock's start and end (Fig. 2); ValueError for an unknown policy or a bad seed."""
+    """Draw a flock's start and end; ValueError for an unknown policy or a bad seed (Fig. 2)."""
     mission = PAPERS[preset]("flocking")
     policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
     start = swarm.states
