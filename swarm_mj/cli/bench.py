@@ -122,5 +122,6 @@ def _table(title: str, columns: Mapping[str, Sequence[sim.Row]], head: str = "")
         table.add_column(name, justify="right")
     for rows in zip(*columns.values(), strict=True):
         first, *_ = rows
-        table.add_row(first.name, *(row.shown for row in rows), end_section=first.ends_section)
+        shown = (row.form.format(row.value) for row in rows)
+        table.add_row(first.name, *shown, end_section=first.ends_section)
     return table

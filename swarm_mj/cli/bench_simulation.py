@@ -57,11 +57,6 @@ class Row(NamedTuple):
     form: str = "{:.2f} µs"  # of the value, with its unit
     ends_section: bool = False
 
-    @property
-    def shown(self) -> str:
-        """The value as the table has it."""
-        return self.form.format(self.value)
-
 
 def simulation_rows(num_missions: int, num_threads: int, seconds: float) -> Iterator[Row]:
     """Time random walks of 40 robots with round robin, B side by side, per window of one mission.

@@ -59,8 +59,11 @@ def run(options: FlyOptions) -> int:
     mission = options.mission
     (asked,) = registry.with_payload([options.policy], options.payload)
     options = replace(options, policy=registry.flown_name(asked, mission))
-    path = _replay_path(options)
-    _check_machine(options, path)
+    if path := _replay_path(options):
+        need("rerun", "a replay", "fly without one: --no-record")
+    way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
+    needs = flight_needs(mission, options.policy, is_recorded=path is not None)
+    check_fits(needs, path, way_out, is_forced=options.yes)
     console = Console(stderr=True, highlight=False)
     flown = fly_mission(
         mission,
@@ -93,15 +96,6 @@ def run(options: FlyOptions) -> int:
         console.print(f"{flown.ending}.")
         return flown.code
     return view.run(view.view_command(path)) if options.view and path else DONE
-
-
-def _check_machine(options: FlyOptions, path: Path | None) -> None:
-    """Raise an error if a package, memory or disk for the flight and its replay is missing."""
-    if path:
-        need("rerun", "a replay", "fly without one: --no-record")
-    way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
-    needs = flight_needs(options.mission, options.policy, is_recorded=path is not None)
-    check_fits(needs, path, way_out, is_forced=options.yes)
 
 
 def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str, str]]:

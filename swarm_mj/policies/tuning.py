@@ -5,7 +5,7 @@ The table has one row per policy and regime; `tools/tune.py` wrote it.
 
 import math
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 
 import msgspec
@@ -67,6 +67,4 @@ def read_table(path: Path) -> list[Tuned]:
     return msgspec.convert([row for _, row in rows], list[Tuned], strict=False)
 
 
-@cache
-def _table() -> list[Tuned]:
-    return read_table(TABLE)
+_table = cache(partial(read_table, TABLE))

@@ -11,7 +11,7 @@ from difflib import get_close_matches
 from functools import partial
 from numbers import Integral, Real
 from types import NoneType
-from typing import Any, ClassVar, Literal, Protocol, get_args, get_origin, runtime_checkable
+from typing import Any, Literal, get_args, get_origin
 
 import numpy as np
 
@@ -32,13 +32,6 @@ FORMER_NAMES = {
     "arm": "credit_assignment",
 }
 FieldOf = Any  # what a field's maker returns: type checkers take it for the attribute's value
-
-
-@runtime_checkable
-class Settings(Protocol):
-    """Any dataclass."""
-
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
 
 
 def setting(default: object = MISSING, help: str = "", **metadata: Any) -> FieldOf:
@@ -65,7 +58,7 @@ def same_as(owner: type[Any], name: str) -> FieldOf:
     return field(default=spec.default, metadata=spec.metadata)
 
 
-def check(settings: Settings) -> None:
+def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
     """Raise ValueError unless every field's value is of its kind and in its range or choices.
 
     The message names the field, what is allowed, and the value. NumPy's numbers, which JSON does
