@@ -59,9 +59,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self.single_observation_space, self.single_action_space = team_spaces(batch)
         self.observation_space = batch_space(self.single_observation_space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        self._seen = cast(
-            "Observation", create_empty_array(self.single_observation_space, num_envs)
-        )
+        self._seen: Any = create_empty_array(self.single_observation_space, num_envs)
 
     def reset(
         self,

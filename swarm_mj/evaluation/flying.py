@@ -45,13 +45,8 @@ def fly_study(
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     flown = (engine if left else Local()).run(fly_batch, [study.batches[index] for index in left])
-    bar = WorkBar(
-        "Flying",
-        study.num_missions,
-        "missions",
-        completed=num_flown(study, costs),
-        console=console,
-    )
+    done = num_flown(study, costs)
+    bar = WorkBar("Flying", study.num_missions, "missions", completed=done, console=console)
     with bar, closing(flown):
         for which, batch_costs in flown:
             index = left[which]

@@ -44,12 +44,7 @@ def _named(label: str, default: object, **about: Any) -> FieldOf:
 
 
 def _number(
-    default: float | int | None,
-    label: str,
-    unit: str,
-    low: float,
-    high: float,
-    **more: str | bool,
+    default: float | int | None, label: str, unit: str, low: float, high: float, **more: str | bool
 ) -> FieldOf:
     """Return a number: name in words, unit, range. By default it is of IV-B."""
     about: dict[str, Any] = {"source": "IV-B", "unit": unit, "low": low, "high": high}
