@@ -39,9 +39,7 @@ RESULT, RESULT_IN_FILE = 1000.0, 300.0
 class Evaluation:
     """Costs of policies on the same missions; tables need pandas, charts matplotlib.
 
-    Attributes:
-        mission: The missions' numbers.
-        results: The costs of each policy, in the order in which they were named.
+    `mission` has the missions' numbers, `results` each policy's costs, in the order named.
     """
 
     mission: Mission

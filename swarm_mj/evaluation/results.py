@@ -133,8 +133,7 @@ def read_results(path: Path) -> list[Result]:
     """Return the rows of a file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
 
     Columns that no result has are ignored, and those with a default may be missing. Raises
-    ValueError if the file cannot be read, is no CSV, lacks columns or rows, or a cell is not of its
-    column's kind.
+    ValueError if the file cannot be read as such, or has no rows.
     """
     try:
         rows = read_rows(path, "results file", MAX_BYTES)
