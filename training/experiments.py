@@ -16,6 +16,7 @@ class Scale:
 
     train: str  # of `swarm-mj train`
     fly: str  # of `swarm-mj evaluate`
+    own: dict[str, str]  # of single trainings, by their names
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -37,7 +38,10 @@ def read_experiment(path: Path) -> Experiment:
     """
     text = read_file(path, "experiment", MOST_BYTES)
     try:
-        return read_plain(tomllib.loads(text.decode()), Experiment)
+        table = tomllib.loads(text.decode())
+        for name in ("quick", "full"):
+            table[name] = {"own": {}} | table.get(name, {})
+        return read_plain(table, Experiment)
     except ValueError as error:
         raise ValueError(f"experiment {path} cannot be read: {error}") from error
 

@@ -101,7 +101,8 @@ class Work:
     @property
     def digest(self) -> str:
         """A digest of everything in its file that counts at this scale."""
-        said = (asdict(self.scale), self.experiment.trainings, self.experiment.flights)
+        scale = {name: options for name, options in asdict(self.scale).items() if options}
+        said = (scale, self.experiment.trainings, self.experiment.flights)
         return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:12]
 
     @property
@@ -122,8 +123,8 @@ class Work:
     def trainings(self) -> dict[str, list[str]]:
         """The arguments of `swarm-mj` that begin each training."""
         return {
-            name: ["train", *typed(self.scale.train, own), "--out", str(self.folder / name)]
-            for name, own in self.experiment.trainings.items()
+            name: ["train", *self._options(name), "--out", str(self.folder / name)]
+            for name in self.experiment.trainings
         }
 
     @cached_property
@@ -134,6 +135,11 @@ class Work:
             for number, (missions, curves) in enumerate(self.experiment.flights.items())
             for draft in [self.folder / f"flights-{number}.csv"]
         ]
+
+    def _options(self, name: str) -> list[str]:
+        """Return a training's options: the scale's, its own, and its own at this scale."""
+        own = shlex.join(typed(self.experiment.trainings[name], self.scale.own.get(name, "")))
+        return typed(self.scale.train, own)
 
     def _evaluate(self, missions: str, flown: Iterable[str], draft: Path) -> list[str]:
         for name in flown:
@@ -208,7 +214,7 @@ class Work:
         _, config = read_policy(self.folder / name / POLICY)
         return {
             "training": name,
-            "options": shlex.join(typed(self.scale.train, self.experiment.trainings[name])),
+            "options": shlex.join(self._options(name)),
             "decisions": int(rows[-1]["decisions"]),
             "minutes": rows[-1]["minutes"],
             "best_decisions": config.training["decisions"],  # of the policy that was kept

@@ -40,7 +40,7 @@ class PpoSettings:
     least_share: float = setting(0.1, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
     num_minibatches: int = setting(10, low=1, high=10**6)  # into which a rollout is divided
-    num_epochs: int = setting(2, low=1, high=1000)  # passes over a rollout
+    num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)  # passes over a rollout
     discount: float = setting(0.0, HELP["discount"], low=0.0, high=1.0)
     gae_lambda: float = setting(0.9, low=0.0, high=1.0)
     clip: float = setting(0.2, low=1e-12, high=1e6)  # of the probability ratio
@@ -85,7 +85,7 @@ class Training:
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
-    silence_logit: float = setting(7.0, low=-100.0, high=100.0)
+    silence_logit: float = setting(7.0, HELP["silence_logit"], low=-100.0, high=100.0)
     reward: Reward = common_setting("aoi", HELP["reward"], choices=get_args(Reward))
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)

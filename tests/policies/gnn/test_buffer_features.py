@@ -1,0 +1,137 @@
+"""Every feature of the buffer by hand, on one team of four, and laws; times are in windows."""
+
+import math
+
+import numpy as np
+import pytest
+from mixed_missions import MISSION as WALK
+from mixed_missions import flown
+
+from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.buffer_features import BufferFeatures
+from swarm_mj.protocol.buffers import NEVER, empty_buffers
+from swarm_mj.protocol.window import LocalViews
+
+NOW = 10.0
+OBSERVER = 1  # the robot whose row is looked at
+
+
+def buffers_of_robot_1():
+    """It heard of robot 0 at 4 from itself, never of robot 2, of robot 3 at 9 by way of robot 0.
+
+    It last addressed robot 0, at 8. Robot 0 is 50 m off, robot 3 is 350 m off.
+    """
+    buffers = empty_buffers(1, 4)
+    buffers.timestamp[0, OBSERVER] = [4.0, NOW, NEVER, 9.0]
+    buffers.position_m[0, OBSERVER] = [[150.0, 0.0], [100.0, 0.0], [0.0, 0.0], [-110.0, -280.0]]
+    buffers.velocity_mps[0, OBSERVER] = [[1.0, -3.0], [-1.0, 0.0], [0.0, 0.0], [-1.0, 0.0]]
+    buffers.parent[0, OBSERVER] = [1, -1, -1, 0]
+    buffers.last_attempt[0, OBSERVER, 0] = 8.0
+    return buffers
+
+
+def seen(buffers, mission=None):
+    """The features of each teammate by name, and whom robot 1 may address."""
+    extractor = BufferFeatures(mission or paper("stationary", num_robots=4))
+    graphs = extractor.graphs(LocalViews(buffers=buffers, now=np.array([NOW]), phases=()))
+    values = graphs.node[OBSERVER].T
+    return dict(zip(extractor.names, values, strict=True)), graphs
+
+
+def log_age(windows):
+    return math.log(1 + windows) / math.log(501)
+
+
+def log_count(count):
+    return math.log(1 + count) / math.log(41)
+
+
+def check(found, expected):
+    for name, values in expected.items():
+        np.testing.assert_allclose(found[name], values, rtol=1e-6, err_msg=name)
+
+
+def test_states_and_ages():
+    found, graphs = seen(buffers_of_robot_1())
+    check(
+        found,
+        {
+            "is oneself": [0, 1, 0, 0],
+            "is known": [1, 1, 0, 1],
+            "age of T": [log_age(6), 0, 1, log_age(1)],
+            "age of L": [log_age(2), log_age(2), 1, 1],  # its own: of its last packet
+            "x, in ranges": [0.2, 0, 0, -0.84],
+            "y, in ranges": [0, 0, 0, -1.12],
+            "distance": [0.05, 0, 0, 0.35],  # of 4 ranges
+            "is in range": [1, 0, 0, 0],
+            "P is oneself": [1, 0, 0, 0],
+            "v_x": [2 / 3, 0, 0, 0],
+            "v_y": [-1, 0, 0, 0],
+            "share of the team known": [0.75] * 4,
+            "neighbours": [0.1] * 4,
+            "size of the team": [0.1] * 4,
+        },
+    )
+    assert graphs.may_address[OBSERVER].tolist() == [True, True, True, False]  # 1.4 ranges are far
+    assert graphs.parent[OBSERVER].tolist() == [1, -1, -1, 0]
+    assert not graphs.has_turn.any()
+
+
+def test_who_has_been_silent_for_longer():
+    """Robot 1 spoke at 8: robot 0, heard of at 4, is staler; robot 3, at 9, is not."""
+    found, _ = seen(buffers_of_robot_1())
+    one = log_count(1)
+    check(
+        found,
+        {
+            "is staler": [1, 0, 0, 0],
+            "rank by T": [0, one, log_count(3), log_count(2)],  # who is unknown comes last
+            "staler robots within 0.25 ranges": [one] * 4,
+            "staler robots within 0.5 ranges": [one] * 4,
+            "staler robots": [one] * 4,
+        },
+    )
+
+
+@pytest.mark.parametrize(
+    ("ranges", "counts"),
+    [(0.24, [1, 1, 1, 1, 1]), (0.4, [0, 1, 1, 1, 1]), (0.9, [0, 0, 1, 1, 1]),
+     (1.9, [0, 0, 0, 1, 1]), (2.1, [0, 0, 0, 0, 1])],
+)  # fmt: skip
+def test_staler_robots_count_by_their_distance(ranges, counts):
+    buffers = buffers_of_robot_1()
+    buffers.position_m[0, OBSERVER, 0] = [100.0, 250.0 * ranges]
+    found, _ = seen(buffers)
+    within = [" within 0.25 ranges", " within 0.5 ranges", " within 1 range", " within 2 ranges", ""]
+    for name, count in zip([f"staler robots{each}" for each in within], counts, strict=True):
+        assert found[name][OBSERVER] == pytest.approx(log_count(count)), name
+
+
+def test_robots_that_are_equally_stale_have_the_same_rank():
+    """Nothing tells identities apart: those never heard of come last together."""
+    buffers = empty_buffers(1, 4)
+    buffers.timestamp[0, OBSERVER, OBSERVER] = NOW
+    check(seen(buffers)[0], {"rank by T": [log_count(1), 0, log_count(1), log_count(1)]})
+
+
+def test_other_identities_are_the_same_graph():
+    """The features of renamed robots are the renamed features: there is no order of identities."""
+    views = flown(0)[-1]
+    order = np.random.default_rng(0).permutation(views.num_robots)
+    extractor = BufferFeatures(WALK)
+    node = extractor.graphs(views).node.reshape(*views.buffers.timestamp.shape, -1)
+    renamed = extractor.graphs(_renamed(views, order)).node.reshape(node.shape)
+    np.testing.assert_array_equal(renamed, node[:, order][:, :, order])
+
+
+def _renamed(views, order):
+    buffers, place = views.buffers, np.argsort(order)
+    pairs = {
+        name: getattr(buffers, name)[:, order][:, :, order]
+        for name in ("timestamp", "position_m", "velocity_mps", "parent", "last_attempt")
+    }
+    parent = pairs["parent"]
+    pairs["parent"] = np.where(parent < 0, parent, place[parent]).astype(parent.dtype)
+    return LocalViews(
+        buffers=type(buffers)(**pairs, is_granted=buffers.is_granted), now=views.now, phases=()
+    )
