@@ -25,7 +25,7 @@ NODE = np.dtype([(field, np.float32) for field in FEATURES])
 
 
 class BufferFeatures(FeatureExtractor):
-    """What the paper's features tell, as a network can use it; see `FEATURES`."""
+    """The paper's information, as a network can use it; see `FEATURES`."""
 
     names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
 

@@ -102,8 +102,9 @@ def test_staler_robots_count_by_their_distance(ranges, counts):
     buffers = buffers_of_robot_1()
     buffers.position_m[0, OBSERVER, 0] = [100.0, 250.0 * ranges]
     found, _ = seen(buffers)
-    within = [" within 0.25 ranges", " within 0.5 ranges", " within 1 range", " within 2 ranges", ""]
-    for name, count in zip([f"staler robots{each}" for each in within], counts, strict=True):
+    within = ["0.25 ranges", "0.5 ranges", "1 range", "2 ranges"]
+    names = [*(f"staler robots within {each}" for each in within), "staler robots"]
+    for name, count in zip(names, counts, strict=True):
         assert found[name][OBSERVER] == pytest.approx(log_count(count)), name
 
 
