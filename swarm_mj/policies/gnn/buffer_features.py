@@ -33,8 +33,9 @@ class BufferFeatures(FeatureExtractor):
         """Return the buffers, encoded; teammates believed far out of range are not addressed."""
         buffers, mission = views.buffers, self._mission
         node = np.empty(buffers.timestamp.shape, dtype=NODE)
-        rows = node.shape[0] * node.shape[1], node.shape[2]
-        is_known = buffers.is_known | np.eye(views.num_robots, dtype=np.bool_)
+        num_missions, num_robots = buffers.shape
+        rows = num_missions * num_robots, num_robots
+        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
         spoke = buffers.last_attempt.max(axis=2)
         _write_times(buffers.timestamp, buffers.last_attempt, is_known, spoke, views.now, node)
         states = buffers.position_m, buffers.velocity_mps, buffers.parent
