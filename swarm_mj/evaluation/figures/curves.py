@@ -34,6 +34,7 @@ class Curve:
     x: Float[np.ndarray, "X"]
     mean: Float[np.ndarray, "X"]
     sem: Float[np.ndarray, "X"]  # standard error of the mean; nan where it is unknown
+    band: Float[np.ndarray, "2 X"] | None = None  # the means' least and greatest, of trainings
 
 
 def preset_of(results: Sequence[Result]) -> str:
@@ -77,7 +78,7 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
         values = [(point.x, point.mean, point.sem) for point in its]
         is_level = not figure.sweeps_missions and len({value[1:] for value in values}) == 1
         drawn.append(_curve(method, values, is_published=True, is_level=is_level))
-    more = {result.policy for result in results if carries_more(result)}
+    more = {method_of(result) for result in results if carries_more(result)}
     own: dict[tuple[str, bool], list[tuple[float, float, float]]] = {}
     for result in results:
         x = _x(figure, result)
@@ -85,15 +86,28 @@ def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[C
         ends = (figure.xs[0], figure.xs[-1]) if x is None else (x,)
         mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
         sem = math.nan if sem is None else sem
-        own.setdefault((result.policy, x is None), []).extend((end, mean, sem) for end in ends)
-    for (policy, is_level), values in own.items():
-        drawn.append(_curve(policy, values, is_level=is_level, carries_more=policy in more))
+        key = method_of(result), x is None
+        own.setdefault(key, []).extend((end, mean, sem) for end in ends)
+    for (method, is_level), values in own.items():
+        drawn.append(_curve(method, values, is_level=is_level, carries_more=method in more))
     return drawn
 
 
+def method_of(result: Result) -> str:
+    """Return the method that a result counts for: of `NAME, seed 2`, another training, `NAME`."""
+    return result.policy.partition(", seed ")[0]
+
+
 def _curve(method: str, rows: Iterable[tuple[float, float, float]], **traits: bool) -> Curve:
-    x, mean, sem = np.array(sorted(rows), dtype=float).T
-    return Curve(method=method, x=x, mean=mean, sem=sem, **traits)
+    """Return a curve of means; of several trainings at an x their mean, without its error."""
+    columns = []
+    for x, its in groupby(sorted(rows), key=lambda row: row[0]):
+        means, sems = np.array([row[1:] for row in its], dtype=float).T
+        sem = sems[0] if len(sems) == 1 else math.nan
+        columns.append((x, means.mean(), sem, means.min(), means.max()))
+    x, mean, sem, *ends = np.array(columns).T
+    band = None if np.array_equal(*ends) else np.array(ends)
+    return Curve(method=method, x=x, mean=mean, sem=sem, band=band, **traits)
 
 
 def _x(figure: ResultFigure, result: Result) -> float | None:

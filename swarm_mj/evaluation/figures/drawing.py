@@ -13,7 +13,7 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.curves import Curve, NoPointsError, curves, results_of
+from swarm_mj.evaluation.figures.curves import Curve, NoPointsError, curves, method_of, results_of
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, look_of, styled, write_caption
 from swarm_mj.evaluation.published import Panel, ResultFigure
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
@@ -41,7 +41,7 @@ def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[st
     """Draw our curves and the published ones, of these methods or all; raise as `results_of`."""
     found = results_of(figure, results)
     if methods:
-        found = [result for result in found if result.policy in methods] or found[:1]
+        found = [result for result in found if method_of(result) in methods] or found[:1]
     costs = [curves(figure, panel.cost, found) for panel in figure.panels]
     if methods:
         costs = [[curve for curve in of if curve.method in methods] for of in costs]
@@ -92,11 +92,16 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
         least, most = f"{min(decisions):,}", f"{max(decisions):,}"
         numbers = most if least == most else f"{least} to {most}"
         lines.append(f"our GNNs: trained on {numbers} {PAPERS_BUDGET}")
+    if any(each.policy != method_of(each) for each in results):
+        lines[-1] += "; bands: from the best to the worst training"
     return "\n".join(lines)
 
 
 def _draw_curve(axes: Axes, curve: Curve) -> None:
-    """Draw a line with error bars, or a level with a band; published markers are rings."""
+    """Draw a line with error bars, or a level with a band; published markers are rings.
+
+    A band shows several trainings, or a level's error.
+    """
     look, is_published = look_of(curve.method), curve.is_published
     line = {
         "label": name_of(curve) + (", published" if is_published else ""),
@@ -112,10 +117,13 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
         }
         bars = {"yerr": curve.sem, "elinewidth": 0.9, "capsize": 2.0}
         axes.errorbar(curve.x, curve.mean, **bars, **line, **marker)
-        return
-    axes.plot(curve.x, curve.mean, **line)
-    if not is_published:
-        low, high = curve.mean - curve.sem, curve.mean + curve.sem
+    else:
+        axes.plot(curve.x, curve.mean, **line)
+    band = curve.band
+    if band is None and curve.is_level and not is_published:
+        band = curve.mean - curve.sem, curve.mean + curve.sem
+    if band is not None:
+        low, high = band
         axes.fill_between(curve.x, low, high, color=look.colour, alpha=0.2, linewidth=0.0)
 
 

@@ -66,6 +66,22 @@ def test_a_policy_with_receptive_fields_has_a_curve_over_them():
     assert not curve.is_level
 
 
+def test_trainings_with_several_seeds_are_one_curve_with_a_band():
+    names = ["GNN", "GNN, seed 2", "GNN, seed 3"]
+    ages = {0.2: [50.0, 44.0, 47.0], 0.5: [13.0, 12.0, 17.0]}
+    results = [
+        result(name, range_ratio=x, aoi_mean=age, aoi_sem=1.0)
+        for x, each in ages.items()
+        for name, age in zip(names, each, strict=True)
+    ]
+    curve = found(FIG4, results)["GNN", False]
+    np.testing.assert_array_equal(curve.mean, [47.0, 14.0])
+    np.testing.assert_array_equal(curve.band, [[44.0, 12.0], [50.0, 17.0]])
+    assert np.isnan(curve.sem).all()  # they flew the same missions
+    assert "from the best to the worst training" in caption(FIG4, results)
+    assert found(FIG4, results[::3])["GNN", False].band is None
+
+
 def test_other_regimes_are_passed_over():
     others = [result("mst", "random-walk"), result("mst", num_robots=20)]
     kept = result("tdma", velocity_ratio=0.5)  # which is nothing to a stationary team

@@ -119,6 +119,21 @@ def test_a_level_is_a_line_with_a_band():
     np.testing.assert_array_equal(bars(axes)["GNN, published"][0].get_xdata(), range(6))
 
 
+def test_a_band_reaches_from_the_best_to_the_worst_training():
+    curves = {"GNN": (20.0, 10.0), "GNN, seed 2": (24.0, 9.0)}
+    results = [
+        each
+        for name, (at_20, at_50) in curves.items()
+        for each in sweep(name, "range_ratio", {0.2: (at_20, 1.0), 0.5: (at_50, 1.0)})
+    ]
+    (axes,) = draw(FIG4, results, ["GNN"]).axes
+    band = next(c for c in axes.collections if isinstance(c, PolyCollection))
+    assert set(map(tuple, band.get_paths()[0].vertices)) == {
+        (0.2, 20.0), (0.2, 24.0), (0.5, 9.0), (0.5, 10.0),
+    }  # fmt: skip
+    np.testing.assert_array_equal(bars(axes)["GNN"][0].get_ydata(), [22.0, 9.5])
+
+
 def test_panels_have_one_height_in_every_figure():
     """3.3 inches, 0.35 between two, 0.86 above and 0.75 below them."""
     one, two = draw(FIG4, everything()), draw(FIG6, everything())
