@@ -29,6 +29,7 @@ class Streams(NamedTuple):
     policy: list[np.random.Generator]
     failures: list[np.random.Generator]
     channel: list[np.random.Generator]
+    localisation: list[np.random.Generator]
 
 
 def streams_of(seeds: Sequence[int]) -> Streams:
@@ -69,8 +70,7 @@ class Stream:
     def __init__(
         self, rngs: Sequence[np.random.Generator], draw: Draw, shape: tuple[int, ...]
     ) -> None:
-        self._rngs = rngs
-        self._draw = draw
+        self._rngs, self._draw = rngs, draw
         self._block = np.empty((BLOCK, len(rngs), *shape))
         self._next = BLOCK
 

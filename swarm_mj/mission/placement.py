@@ -110,6 +110,5 @@ def draw_survivors(
         return None
     is_active = np.ones((len(rngs), mission.num_robots), dtype=np.bool_)
     for b, rng in enumerate(rngs):
-        failing = rng.choice(mission.num_robots, size=mission.num_failures, replace=False)
-        is_active[b, failing] = False
+        is_active[b, rng.choice(mission.num_robots, mission.num_failures, replace=False)] = False
     return is_active

@@ -65,9 +65,9 @@ def beyond_free_space(mission: Mission) -> str:
 
 
 def radio_in_words(mission: Mission) -> str:
-    """Return what differs from the paper's radio, in words; empty if nothing does."""
-    numbers = ("sinr_threshold_db", "noise_dbm", "sensing_dbm", "map_offset_m")
-    other = [name for name in numbers if getattr(mission, name) != getattr(Mission(), name)]
+    """Return what differs from the paper's radio and positions, in words; empty if nothing does."""
+    usual = Mission()
+    other = [name for name in _NUMBERS["other"] if getattr(mission, name) != getattr(usual, name)]
     words = [f"{name} {as_typed(getattr(mission, name))}" for name in other]
     return ", ".join(filter(None, (beyond_free_space(mission), *words)))
 

@@ -53,6 +53,7 @@ def _number(
 
 # Numbers of the channel beyond free space are options under a heading of their own.
 _radio = partial(_number, group=CHANNEL, source=NEW)
+_new = partial(_number, source=NEW, may_lack=True)
 
 
 def _choice(default: str, label: str, source: str, choices: object, **about: Any) -> FieldOf:
@@ -93,6 +94,8 @@ class Mission:
         None, "sensing threshold", "dBm", -200.0, 50.0, may_lack=True
     )
     frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
+    position_noise_m: float = _new(0.0, "position noise", "m", 0.0, 1e4)
+    position_noise_s: float = _new(10.0, "position noise time", "s", 0.0, 1e5)
     failure_fraction: float = _number(0.0, "failure fraction", "of the team", 0.0, 0.9, source=NEW)
     arena: str = _named("arena", OPEN, metavar="NAME")
 

@@ -18,6 +18,12 @@ class RobotStates:
     position_m: Float[np.ndarray, "B N 2"]  # p [m]
     velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
     is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and transmits; None: all robots
+    observed_m: Float[np.ndarray, "B N 2"] | None = None  # own position, with its error [m]
+
+    @property
+    def own_m(self) -> Float[np.ndarray, "B N 2"]:
+        """Where each robot observes itself to be: exactly at p unless it errs [m]."""
+        return self.position_m if self.observed_m is None else self.observed_m
 
 
 class Obstacles(NamedTuple):

@@ -63,8 +63,8 @@ def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
 
 
 def grant_start(buffers: Buffers, states: RobotStates) -> None:
-    """Write all true states at the start into empty buffers, without parents."""
-    buffers.position_m[:] = states.position_m[:, None]
+    """Write all states at the start, as observed, into empty buffers, without parents."""
+    buffers.position_m[:] = states.own_m[:, None]
     buffers.velocity_mps[:] = states.velocity_mps[:, None]
     buffers.is_granted[:] = True
 
@@ -72,7 +72,7 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
     """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
     known = buffers.timestamp, buffers.position_m, buffers.velocity_mps
-    write_own(*known, states.position_m, states.velocity_mps, now, states.is_active)
+    write_own(*known, states.own_m, states.velocity_mps, now, states.is_active)
 
 
 def record_attempt(

@@ -31,7 +31,7 @@ def talk(
     said = np.empty((num_slots, 2, *recipient.shape), dtype=np.int64)
     said[0, 0] = recipient  # in the one type and layout that the loops are compiled for
     known = buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent
-    truth = states.position_m, states.velocity_mps, states.is_active
+    truth = states.position_m, states.own_m, states.velocity_mps, states.is_active
     _talk(*known, buffers.last_attempt, *truth, now, silence_is_attempt, *radio.rule, said)
     return said
 
@@ -44,6 +44,7 @@ def _talk(
     parent: Int[np.ndarray, "B N N"],
     last_attempt: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
+    own_m: Float[np.ndarray, "B N 2"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     is_active: Bool[np.ndarray, "B N"] | None,
     now: Float[np.ndarray, "B"],
@@ -62,7 +63,7 @@ def _talk(
             answer(said[slot - 1, 0], said[slot - 1, 1], recipient)
         for b in range(time.shape[0]):
             time[b] = now[b] + slot * SLOT_WINDOWS
-        write_own(timestamp, believed_m, believed_mps, position_m, velocity_mps, time, is_active)
+        write_own(timestamp, believed_m, believed_mps, own_m, velocity_mps, time, is_active)
         silence(recipient, is_active)
         sender = decode_strongest(
             position_m, recipient, received_at_1_m_mw, noise_mw, threshold, hears_while_sending

@@ -18,6 +18,7 @@ from swarm_mj.protocol.buffers import ABSENT, NEVER, NO_PARENT, Buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.compiled import compiled
 
+MAX_STDS = 10.0  # more than any error of a position
 BITS_PER_BYTE = 8
 POSITION_BITS, VELOCITY_BITS = 16, 8  # per axis
 TIE_BREAK = 1e-9  # rises are halves of a window, so this decides between equal ones only
@@ -89,10 +90,11 @@ def age(name: str) -> PacketField:
 
 
 def position(name: str, mission: Mission, bits: int) -> PacketField:
-    """Return a place that robots can reach; 16 bits step by 1.5 cm for 40 robots within walls."""
+    """Return a place that robots may report; 16 bits step by 1.5 cm for 40 robots within walls."""
     # Teams without walls leave their area, at most with their largest velocity.
     duration_s = mission.num_windows * mission.window_s
     outside_m = 0.0 if mission.has_walls else mission.max_velocity_mps * duration_s
+    outside_m += MAX_STDS * mission.position_noise_m
     return _symmetric(name, bits, mission.half_side_m + outside_m, "m")
 
 

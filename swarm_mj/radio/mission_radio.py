@@ -5,7 +5,7 @@ receives.
 """
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
 
@@ -38,6 +38,7 @@ class Belief:
     law: PowerLaw | None = None  # of mean powers [mW]; None is that of free space
     reception: Reception | None = None  # the statistics of fades and losses; None: there are none
     shadowing_db: float = 0.0  # standard deviation of the powers' unknown part [dB]
+    position_noise_m: float = 0.0  # standard deviation of robots' own positions, per axis [m]
 
     def law_over_noise(self, num_robots: int) -> PowerLaw:
         """Return the law of a team's mean powers, free space's too, in units of the noise."""
@@ -52,7 +53,13 @@ class Belief:
         spread_m: Float[np.ndarray, "N"] | None = None,
         is_known: Bool[np.ndarray, "N"] | None = None,
     ) -> Links:
-        """Return the links between believed positions; arguments as of `links_between`."""
+        """Return the links between believed positions; arguments as of `links_between`.
+
+        Noise of robots' own positions adds to the spread.
+        """
+        if self.position_noise_m > 0.0:
+            given_m = 0.0 if spread_m is None else spread_m
+            spread_m = np.hypot(np.full(len(position_m), self.position_noise_m), given_m)
         links = links_between(self.radio, position_m, spread_m, is_known, self.law)
         return _with_chances(links, self.reception, self.shadowing_db)
 
@@ -130,21 +137,18 @@ def mission_radio(
 
 def _belief(mission: Mission, obstacles: Obstacles | None) -> Belief:
     """Return what the mission grants to know of its channel."""
-    radio, known = radio_of(mission), None
+    known, belief = None, Belief(radio=radio_of(mission), position_noise_m=mission.position_noise_m)
     if obstacles is not None and mission.grants("map"):
         centre_m = obstacles.centre_m + np.array([mission.map_offset_m, 0.0, 0.0])
         known = obstacles._replace(centre_m=centre_m)
     if beyond_free_space(mission) and mission.grants("statistics"):
-        return Belief(
-            radio=radio,
-            law=_law(mission, radio, known),
-            reception=_reception(mission, radio),
-            shadowing_db=mission.shadowing_db,
-        )
+        law, reception = _law(mission, belief.radio, known), _reception(mission, belief.radio)
+        shadowing_db = mission.shadowing_db
+        return replace(belief, law=law, reception=reception, shadowing_db=shadowing_db)
     if known is not None:
-        law = free_space_law(radio.received_at_1_m_mw, mission.num_robots, known)
-        return Belief(radio=radio, law=law)
-    return Belief(radio=radio)
+        law = free_space_law(belief.radio.received_at_1_m_mw, mission.num_robots, known)
+        return replace(belief, law=law)
+    return belief
 
 
 def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:

@@ -31,6 +31,7 @@ from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowP
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.obstruction import blocked
+from swarm_mj.simulation.localisation import Localisation
 from swarm_mj.system.fields import check_kind, name_of
 
 MAX_THREADS = 1024
@@ -97,9 +98,12 @@ class Swarm:
         self.now = np.zeros(len(seeds))  # t [windows]
         room = fitting(packet_of(mission), mission, "T, M and P").num_entries
         self.buffers: Buffers = with_room(empty_buffers(len(seeds), mission.num_robots), room)
-        observe_self(self.buffers, self.states, self.now)
+        is_exact = mission.position_noise_m == 0.0
+        self._noise = None if is_exact else Localisation(mission, self._rngs.localisation)
+        states = self._noise.observed(self.states) if self._noise else self.states
+        observe_self(self.buffers, states, self.now)
         if mission.grants("start"):
-            grant_start(self.buffers, self.states)
+            grant_start(self.buffers, states)
         self.phases: tuple[Phase, ...] = ()
         self.is_broadcast = False  # whether the last window's packets were for everyone (IV-C)
         self._read_only = self.buffers.read_only()
@@ -182,7 +186,8 @@ class Swarm:
     def move(self) -> RobotStates:
         """Move the robots through one window, by their controller and the physics."""
         wanted_mps2 = self.controller(self._read_only, self._states_for(self._controller_is_ours))
-        return self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
+        states = self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
+        return states if self._noise is None else self._noise.observed(states)
 
     def step(self, policy: Policy | None = None) -> WindowCosts:
         """Fly one window: the policy decides, the robots move, then they talk.

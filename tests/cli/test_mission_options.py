@@ -137,6 +137,7 @@ SWITCHES = {
     "--burst-end 0.1": "--burst-begin above 0",
     "--high-power-db 3": "--high-power-fraction above 0",
     "--map-offset-m 3": "--prior-knowledge map",
+    "--position-noise-s 3": "--position-noise-m above 0",
 }
 
 

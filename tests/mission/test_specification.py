@@ -80,6 +80,7 @@ NOTHING_UNLESS_ASKED = {
     "clock_offset_s",
     "clock_drift_ppm",
     "map_offset_m",
+    "position_noise_m",
 }
 
 

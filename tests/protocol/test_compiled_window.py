@@ -18,6 +18,8 @@ MISSIONS = {
     "authors": reference("flocking", **SIZE),
     "failures": paper("flocking", failure_fraction=0.4, **SIZE),
     "all known": paper("random-walk", prior_knowledge="start", **SIZE),
+    "noise": paper("random-walk", position_noise_m=20.0, position_noise_s=0.2, **SIZE),
+    "noise at rest": paper("stationary", position_noise_m=20.0, **SIZE),
     "several decode": paper("random-walk", sinr_threshold_db=-6.0, **SIZE),
 }
 POLICIES = ("random-flooding", "round-robin", "mst", "tdma", "csma", "age-gain-csma", "planner")

@@ -248,3 +248,15 @@ def test_a_map_that_is_wrong_shows_obstacles_east_of_their_places(offset_m, behi
         loss = 0.1 if (i, j) == behind_wall else 1.0
         believed_mw = radio.belief.links(position_m).received_mw[i, j]
         assert believed_mw == pytest.approx(loss * free_mw)
+
+
+@pytest.mark.parametrize("known", ["nothing", "map", "statistics", "map,statistics"])
+def test_everyone_knows_how_far_positions_err(known):
+    """Of two robots 100 m apart that err by 3 m each, 4 m more in the snapshot of one of them."""
+    fields = {"fading": "rayleigh", "prior_knowledge": known, "position_noise_m": 3.0}
+    belief = mission_radio(paper(num_robots=2, **fields), WALL).belief
+    position_m = np.array([[10.0, 0.0], [110.0, 0.0]])
+    over_std = belief.links(position_m).distance_over_std
+    assert over_std[0, 1] == pytest.approx(100.0 / math.hypot(3.0, 3.0))
+    over_std = belief.links(position_m, np.array([4.0, 0.0])).distance_over_std
+    assert over_std[0, 1] == pytest.approx(100.0 / math.hypot(5.0, 3.0))

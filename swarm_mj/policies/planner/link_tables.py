@@ -25,7 +25,7 @@ from swarm_mj.policies.planner.snapshots import NUM_SENT, Proposals
 from swarm_mj.protocol.packets import PacketField, bits_for, identity, times
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import Curves, Links, decode_curves, doubtful, probability_at
-from swarm_mj.system.decibels import from_db, to_db
+from swarm_mj.system.decibels import DB_PER_NEPER, from_db, to_db
 
 BIN_DB = 2.0
 LEAST_MARGIN_DB = -15.0  # of the lowest bin; packets that are expected to be weaker are not missed
@@ -51,6 +51,7 @@ LAWS = tuple(Law(rician_k, loss) for rician_k in (NO_FADING, NO_LINE_OF_SIGHT) f
 SPREADS_DB = (3.0, 6.0, 9.0)  # of normal priors of a link's excess
 BLOCKED_SHARES = (0.3, 0.6)  # of priors in which links are as believed, or blocked
 BLOCKED_BELOW_DB = -20.0
+DOUBTFUL_STDS = 3.0  # of the margin by errors of positions, within which outcomes say nothing
 STEP_DB = 0.25  # to which tables are rounded
 SURPRISE = 0.005  # probability that a packet decodes, or not, against all laws: no single
 # packet may rule out a hypothesis, since no law here is exactly true
@@ -83,7 +84,10 @@ def observe(
     place = np.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5).astype(np.int64)
     is_missed = np.any(arriving_mw > 0.0, axis=0) & (place >= 0)
     kind = (is_decoded * num_robots + i) * NUM_BINS + np.clip(place, 0, NUM_BINS - 1)
-    return np.where(listens & (is_decoded | is_missed), kind, NOTHING)
+    # Where the error of positions may well have decided, a packet teaches nothing of the channel.
+    doubt_db = DOUBTFUL_STDS * 2.0 * DB_PER_NEPER / prior.distance_over_std[i, everyone]
+    is_telling = (is_decoded | is_missed) & (np.abs(margin_db) >= doubt_db)
+    return np.where(listens & is_telling, kind, NOTHING)
 
 
 class Evidence:

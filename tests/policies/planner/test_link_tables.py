@@ -209,12 +209,14 @@ def powers(**of_link):
     return power_mw
 
 
-def observed(heard, transmitted, believed_mw, *, prior_mw=None, listens=None):
+def observed(
+    heard, transmitted, believed_mw, *, prior_mw=None, listens=None, distance_over_std=np.inf
+):
     """Whom each robot notes, in which bin, and whether as decoded; None if nothing."""
     transmitted = np.array(transmitted, dtype=bool)
     prior_mw = believed_mw if prior_mw is None else prior_mw
-    certain, row = np.full((4, 4), np.inf), np.zeros((4, 4), dtype=np.int64)
-    prior = Links(prior_mw, certain, NOISE_MW, THRESHOLD, KNOWN, row, prior_mw)
+    doubt, row = np.full((4, 4), distance_over_std), np.zeros((4, 4), dtype=np.int64)
+    prior = Links(prior_mw, doubt, NOISE_MW, THRESHOLD, KNOWN, row, prior_mw)
     listens = ~transmitted if listens is None else listens
     noted = observe(listens, np.array(heard), transmitted, believed_mw, prior)
     kinds = [None if kind == NOTHING else np.unravel_index(kind, KINDS) for kind in noted]
@@ -263,6 +265,16 @@ def test_packets_that_are_too_weak_are_not_missed_but_may_be_decoded(margin_db, 
     assert observed([0, 0, 2, 3], [1, 0, 0, 0], power_mw)[1] == (0, 0, True)
     strong_mw = powers(p01=1e9)
     assert observed([0, 0, 2, 3], [1, 0, 0, 0], strong_mw)[1] == (0, NUM_BINS - 1, True)
+
+
+@pytest.mark.parametrize(("margin_db", "is_noted"), [(2.5, False), (2.7, True), (-2.7, True)])
+def test_packets_that_errors_of_positions_may_decide_are_not_noted(margin_db, is_noted):
+    """A distance known to a tenth is a power known to 0.87 dB; three times that is 2.6 dB."""
+    power_mw = powers(p01=10.0 * 10.0 ** (margin_db / 10.0), p03=1e4)
+    for heard in ([0, 0, 2, 0], [0, 1, 2, 0]):
+        noted = observed(heard, [1, 0, 0, 0], power_mw, distance_over_std=10.0)
+        assert (noted[1] is not None) == is_noted
+        assert noted[3] is not None
 
 
 def test_who_notes_nothing():

@@ -1,0 +1,36 @@
+"""Self-localisation with errors, which the paper has not: it takes what robots observe as exact."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.physics.state import RobotStates
+
+
+class Localisation:
+    """The error of every robot's own position: normal, per axis, fading over a correlation time.
+
+    It is a first-order Gauss-Markov process, sampled once a window. A robot that stands, with a
+    velocity of exactly 0, knows by its odometry that it has not moved: its estimate stays.
+    """
+
+    def __init__(self, mission: Mission, rngs: Sequence[np.random.Generator]) -> None:
+        """Prepare errors of missions that begin, mission b's from the b-th generator alone."""
+        self._std_m, time_s = mission.position_noise_m, mission.position_noise_s
+        self._kept = math.exp(-mission.window_s / time_s) if time_s > 0.0 else 0.0
+        self._draws = Stream(rngs, normal, (mission.num_robots, 2))
+        self._error_m: np.ndarray | None = None
+
+    def observed(self, states: RobotStates) -> RobotStates:
+        """Return the states with what robots observe of their own positions, a window later."""
+        error_m, before_m = self._std_m * self._draws.next(), self._error_m
+        if before_m is not None:
+            walked_m = self._kept * before_m + math.sqrt(1.0 - self._kept**2) * error_m
+            moves = np.any(states.velocity_mps, axis=2, keepdims=True)
+            error_m = np.where(moves, walked_m, before_m)
+        self._error_m = error_m
+        return replace(states, observed_m=states.position_m + error_m)
