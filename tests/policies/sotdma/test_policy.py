@@ -76,6 +76,17 @@ def test_eq9_robots_decide_by_their_buffers_and_by_t_and_p_in_packets(preset, ta
         swarm.step(apart)
 
 
+def test_eq9_robots_that_share_a_slot_choose_it_by_their_own_memory():
+    """Of 16 robots 13 have a slot by the order; robot 6 comes last in it, and so chooses."""
+    mission = paper("random-walk", num_robots=16, range_ratio=0.2)
+    swarm, apart = Swarm(mission, [1, 2]), Apart(mission, [6])
+    swarm.start(apart)
+    assert frame_slots(16) == 13
+    assert [team._order[-1] for team in apart.policy._teams] == [6, 6]
+    for _ in range(60):
+        swarm.step(apart)
+
+
 def test_it_begins_as_spatial_tdma_then_everyone_transmits_once_in_every_frame_in_its_own_slot():
     slots, policy = flown(REST, [3], 100)
     turns = transmitters(Swarm(REST, [3]), make_policy("spatial-tdma", REST), FIRST // 2)
