@@ -4,6 +4,9 @@ News has heuristic weights, by hand, from the graph of links that a scheduler be
 row `i` sends or is passed through, column `j` or `k` is reached or is the subject.
 """
 
+from collections.abc import Callable
+from functools import partial
+
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -34,14 +37,18 @@ class Plan:
         timestamp: Float[np.ndarray, "N N"] | None = None,
         now: float = 0.0,
         is_free: Bool[np.ndarray, "P"] = ALL_FREE,
+        links_from: Callable[[int], Links] | None = None,
     ) -> None:
         """Prepare a plan that begins with T and t [windows], and in which some slots are not free.
 
-        It looks as far ahead as on certain links if that is said, or else if its links are.
+        It looks as far ahead as on certain links if that is said, or else if its links are. Links
+        may be others from some slots on, every `settings.drawn_slots`.
         """
         is_certain = not links.is_doubtful if is_certain is None else is_certain
         timestamp = np.full_like(links.received_mw, NEVER) if timestamp is None else timestamp
         self._problem = problem_of(links, settings, is_certain=is_certain)
+        self._problem_of = partial(problem_of, settings=settings, is_certain=is_certain)
+        self._links_from, self._drawn_slots = links_from, settings.drawn_slots
         self._timestamp = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)  # [slots]
         self._now = SLOTS_PER_WINDOW * now
         self._is_free = is_free
@@ -60,6 +67,8 @@ class Plan:
 
     def _plan(self, num_slots: int) -> None:
         for slot in range(len(self._transmits), num_slots):
+            if self._links_from is not None and slot % self._drawn_slots == 0:
+                self._problem = self._problem_of(self._links_from(slot))
             named = self._is_free[slot : slot + self._problem.depth]
             is_free = np.ones(self._problem.depth, dtype=bool)
             is_free[: len(named)] = named

@@ -17,7 +17,10 @@ would jam each other. A robot that hears of motion does as the planner of moving
 a payload, goes on with spatial TDMA, whose rule tolerates small differences.
 """
 
+import math
 from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
 from typing import NamedTuple
 
 import numpy as np
@@ -195,8 +198,21 @@ class _Team:
     def _flight(self, position_m: Float[np.ndarray, "N 2"], owner: int | None) -> _Flight:
         prior = self._belief.links(position_m)
         if owner is None or self._current is None:
-            return _Flight(Plan(prior, self._settings), 0, prior, prior.received_mw)
+            drawn = partial(self._drawn, position_m) if self._belief.position_noise_m else None
+            plan = Plan(prior, self._settings, links_from=drawn)
+            return _Flight(plan, 0, prior, prior.received_mw)
         table = self._current.table(owner)
         plan = Plan(link_tables.corrected(prior, table, self._settings), self._settings)
         expected_mw = prior.received_mw * from_db(table.mean_db)
         return _Flight(plan, self._current_begin, prior, expected_mw)
+
+    def _drawn(self, position_m: Float[np.ndarray, "N 2"], slot: int) -> Links:
+        """Return links between places where robots may be, drawn by the slot: the same for all.
+
+        A link that never works would else be planned with for ever, as packets over it have the
+        same chance each time.
+        """
+        noise_m, share = self._belief.position_noise_m, self._settings.drawn_share
+        error_m = noise_m * np.random.default_rng(slot).standard_normal(position_m.shape)
+        belief = replace(self._belief, position_noise_m=math.sqrt(1.0 - share**2) * noise_m)
+        return belief.links(position_m + share * error_m)

@@ -61,6 +61,8 @@ class PlannerSettings:
     share_isolated: float = 0.1  # if a robot has no link
     max_share: float = 1.05
     min_probability: float = 0.05  # links that decode more rarely count as none [1]
+    drawn_slots: int = 40  # for which teams at rest plan with places drawn, where they doubt them
+    drawn_share: float = 0.5  # of the standard deviation of their positions that is drawn [1]
     slack_hops: float = 0.25  # by which a path may exceed the shortest, and still is one [hops]
 
     # Tables of links in teams at rest, chosen on four missions of 240 to 300 windows, with seeds

@@ -143,6 +143,21 @@ def test_a_plan_made_as_it_is_asked_for_is_the_plan_made_at_once(is_doubtful):
     assert np.all(np.any(made, axis=0))  # everyone has its say
 
 
+def test_a_plan_may_take_other_links_every_40_slots():
+    team, asked = team_of(8, 2), []
+    near, apart = (links_between(team.radio, scale * team.position_m) for scale in (1.0, 100.0))
+
+    def links_from(slot):
+        asked.append(slot)
+        return apart if slot == 40 else near
+
+    made = all_transmitters(Plan(apart, SETTINGS, links_from=links_from), 100)
+    np.testing.assert_array_equal(made[:40], all_transmitters(Plan(near, SETTINGS), 40))
+    assert asked == [0, 40, 80]
+    assert not made[40:80].any()
+    assert np.all(np.any(made[80:], axis=0))
+
+
 # What the arithmetic here is about, whatever suits the planner best.
 WEIGHING = PlannerSettings(
     downstream_exponent=0.6,
