@@ -28,16 +28,14 @@ RATE_WINDOWS = 10  # that packets are counted over
 def draw_tree(out: RerunLog) -> None:
     """Draw the ego robot's parent tree as a dendrogram, nodes in the colours of their ages."""
     log = out.log
-    # Robots that are off, too: what is known of them may still be passed on.
-    shown = np.ones_like(log.is_on)
+    shown = np.ones_like(log.is_on)  # those off, too: what is known of them may be passed on
     colours = palette.robot_colours(log.known_age, log.facts.full_scale, shown, log.ego)
     place = dendrogram(log.parent, ~np.isnan(log.known_age), log.ego)
     max_hops = max(4.0, float(np.nanmax(place[..., 0])))
     width, height = TREE
     place *= (width / max_hops, height)
     across = np.arange(1, int(max_hops) + 1) * (width / int(max_hops))
-    strips = [[(x, -10.0), (x, height + 10.0)] for x in across]
-    out.fixed_layer("tree/hops", strips=strips)
+    out.fixed_layer("tree/hops", strips=[[(x, -10.0), (x, height + 10.0)] for x in across])
     row, child = np.nonzero(log.has_parent)
     out.lines("tree/edges", place[row, log.parent[row, child]], place[row, child], row)
     row, node = np.nonzero(~np.isnan(place[..., 0]))
@@ -110,8 +108,7 @@ def draw_states(out: RerunLog) -> None:
     left, above = (-BESIDE * size for size in (num_windows, num_robots))
     robots = range(0, num_robots, max(1, num_robots // NUM_NAMES))
     # rerun writes below a point.
-    names, places = [f"r{i}" for i in robots], [(left, i + 0.5 + above) for i in robots]
-    out.words("state/robots", names, places)
+    out.words("state/robots", [f"r{i}" for i in robots], [(left, i + 0.5 + above) for i in robots])
     every = max(1, int(palette.nice_top(num_windows / NUM_TICKS)))
     ticks = np.flatnonzero(log.window % every == 0).tolist()
     names = [str(log.window[k]) for k in ticks]
@@ -119,16 +116,10 @@ def draw_states(out: RerunLog) -> None:
 
 
 def _draw_classes(
-    out: RerunLog,
-    path: str,
-    shape: tuple[int, ...],
-    classes: Iterable[tuple[str, Any]],
-    size: tuple[float, float],
+    out: RerunLog, path: str, shape: Sequence[int], classes: Iterable[Any], size: Sequence[float]
 ) -> None:
-    """Prepare an image of classes, each with its name and colour, as large as this in its view.
-
-    rerun's own views of tensors and of states write over them, and show short states as grey.
-    """
+    """Prepare an image of classes, each a name and a colour, as large as this in its view."""
+    # rerun's own views of tensors and of states write over them, and show short states as grey.
     out.fixed(path, rr.AnnotationContext([(k, *named) for k, named in enumerate(classes)]))
     (height, width), (x, y) = shape, size
     form = rr.components.ImageFormat(height=height, width=width, channel_datatype="U8")
@@ -223,11 +214,10 @@ def _mismatch_curves(log: Log) -> list[PlotCurve]:
         "works, unbelieved": (palette.UNBELIEVED, unbelieved),
         f"cut off from r{log.ego}": (palette.EGO, log.cut_off_share[at]),
     }
-    curves = []
-    for name, (colour, share) in shares.items():
-        path = "world/" + name.replace(" ", "_")
-        curves.append(PlotCurve(path, name, colour, 100.0 * share, window=window))
-    return curves
+    return [
+        PlotCurve("world/" + name.replace(" ", "_"), name, colour, 100.0 * share, window=window)
+        for name, (colour, share) in shares.items()
+    ]
 
 
 def draw_plots(out: RerunLog) -> None:

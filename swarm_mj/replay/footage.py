@@ -38,8 +38,7 @@ def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) 
     farthest_m = float(np.max(np.abs(position_m)))
     moves = farthest_m > NEAR * half_side_m
     if not moves and not is_tight:
-        centre_m = np.zeros((len(position_m), 2))
-        return Ground(centre_m=centre_m, reach_m=max(half_side_m, farthest_m))
+        return Ground(centre_m=np.zeros((len(position_m), 2)), reach_m=max(half_side_m, farthest_m))
     axis = 1 if moves else (0, 1)
     low_m, high_m = (end(position_m, axis=axis, keepdims=True) for end in (np.min, np.max))
     # Of constant size all the same: a changing scale would look like motion.

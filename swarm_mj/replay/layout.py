@@ -47,19 +47,15 @@ class Layout(rrb.Blueprint):
 
 def layout(log: Log, ground: Ground) -> Layout:
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
-    reach = MARGIN * ground.reach_m
+    across = -MARGIN * ground.reach_m, MARGIN * ground.reach_m
     height = legend_height(log)
-    follows = ", follows the team" if ground.moves else ""
-    name = f"Map, squares of {square_m(ground):g} m{follows}"
-    map_view = _drawing(
-        "/", name, (-reach, reach), (-reach, reach), contents=["/arena/**"], **_hidden("arena")
-    )
+    name = f"Map, squares of {square_m(ground):g} m" + ", follows the team" * ground.moves
+    map_view = _drawing("/", name, across, across, contents=["/arena/**"], **_hidden("arena"))
     samples = _drawing("/legend", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False)
     across, up = ((-0.05 * size, 1.05 * size) for size in TREE)
     tree = _drawing("/tree", f"Tree of r{log.ego}, in hops", across, up)
     every = in_matrix(log.facts.mission.num_robots).step
-    of_some = f", every {every}th robot" if every > 1 else ""
-    ages = f"Ages: rows about columns{of_some}"
+    ages = "Ages: rows about columns" + (f", every {every}th robot" if every > 1 else "")
     matrix = _drawing("/", ages, (0.0, TREE[0]), (0.0, TREE[1]), contents=["/ages"])
     charts = [_plot(name, curves) for name, curves in plots(log).items()]
     mission = rrb.Horizontal(
@@ -79,12 +75,9 @@ def layout(log: Log, ground: Ground) -> Layout:
         name="Radio",
     )
     time = {"timeline": TIMELINE, "fps": WINDOWS_PER_SECOND, "loop_mode": "all"}
-    return Layout(
-        rrb.Tabs(mission, _scene(ground.reach_m), radio, active_tab=0),
-        rrb.TimePanel(state="collapsed", **time),
-        collapse_panels=True,
-        auto_views=False,
-    )
+    tabs = rrb.Tabs(mission, _scene(ground.reach_m), radio, active_tab=0)
+    panel = rrb.TimePanel(state="collapsed", **time)
+    return Layout(tabs, panel, collapse_panels=True, auto_views=False)
 
 
 def _hidden(view: str) -> dict[str, Any]:
@@ -143,8 +136,7 @@ def draw_legend(out: RerunLog) -> None:
     out.fixed("legend/ramp", rr.LineStrips2D(strips, colors=colours, radii=-5.0))
     texts = ["0", f"{full_scale / 2:g}", f"{full_scale:g} windows"]
     out.words("legend/ages", texts, [(LEFT + at * RAMP, BELOW) for at in (0.0, 0.5, 0.95)])
-    about = f"age of what r{out.log.ego} knows"
-    out.words("legend/about_ages", [about], [(LEFT + 0.5 * RAMP, ROW)])
+    out.words("legend/about_ages", [f"age of what r{out.log.ego} knows"], [(LEFT + RAMP / 2, ROW)])
     for row, samples in enumerate(_samples(out.log)):
         for column, (text, layer) in enumerate(samples.items()):
             x, y = LEFT + RAMP + (column + 0.9) * COLUMN, row * _row_height(out.log)

@@ -39,8 +39,6 @@ BRIGHTEST = 0.85  # of one that is hardly too weak
 # over what decodes. Files keep these four numbers.
 NUMBERS = ("sender", "receiver", "loss_db", "margin_db")
 LINK = np.dtype([("row", int), *((name, np.int16) for name in NUMBERS), ("is_too_weak", bool)])
-
-
 LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
 Lines: TypeAlias = Float[np.ndarray, "_ 2 2"]  # from start to end [m]
 

@@ -15,9 +15,8 @@ from jaxtyping import Bool, Float, UInt8
 Colour: TypeAlias = tuple[int, int, int]
 Ages: TypeAlias = Float[np.ndarray, "*S"]  # [windows]; nan: unknown
 
-_SAID: dict[str, dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_suffix(".toml").read_text("utf-8")
-)
+_TEXT = Path(__file__).with_suffix(".toml").read_text("utf-8")
+_SAID: dict[str, dict[str, Any]] = tomllib.loads(_TEXT)
 COLOURS: dict[str, Colour] = {name: tuple(rgb) for name, rgb in _SAID["colours"].items()}
 HALO = 1.7  # the radius around a robot that is cut off, by the robot's
 # The mean age in videos, of one flight and of a second: no colours of the ramp, which mean ages.
@@ -62,9 +61,8 @@ ADDRESSED_STATES, BROADCAST_STATES = _by("addressed_states"), _by("broadcast_sta
 MISMATCH = {"unbelieved": COLOURS["UNBELIEVED"], "too_weak": dim(COLOURS["TOO_WEAK"], 0.7)}
 
 # Nine equal steps of viridis (van der Walt and Smith, 2015, CC0), stale to fresh.
-_VIRIDIS = np.frombuffer(
-    bytes.fromhex("440154 472c7a 3b518b 2c718e 21908d 27ad81 5cc863 aadc32 fde725"), dtype=np.uint8
-).reshape(-1, 3)
+_RGB = bytes.fromhex("440154 472c7a 3b518b 2c718e 21908d 27ad81 5cc863 aadc32 fde725")
+_VIRIDIS = np.frombuffer(_RGB, dtype=np.uint8).reshape(-1, 3)
 ROUND = (1.0, 1.5, 2.0, 3.0, 4.0, 5.0, 10.0)
 _STALEST = 0.10  # the darkest end of viridis would vanish on the background
 

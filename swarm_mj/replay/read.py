@@ -50,11 +50,9 @@ def check_replay(path: Path) -> None:
     with open_file(path, "replay") as file:
         content = file.read()
     if content[-SEAL_BYTES:] != _seal(memoryview(content)[:-SEAL_BYTES]):
-        raise ValueError(
-            f"{path} is no whole replay: damaged, truncated, or not recorded by this version of "
-            "swarm-mj; record it again by `swarm-mj fly`, or see what "
-            f"`rerun {shlex.quote(str(path))}` makes of it"
-        )
+        why = "damaged, truncated, or not recorded by this version of swarm-mj"
+        ways = f"by `swarm-mj fly`, or see what `rerun {shlex.quote(str(path))}` makes of it"
+        raise ValueError(f"{path} is no whole replay: {why}; record it again {ways}")
 
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
@@ -93,10 +91,8 @@ def read_footage(path: Path) -> Footage:
             ground=shown_ground(position_m, mission),
         )
     except (KeyError, ValueError, pa.ArrowException) as error:
-        raise ValueError(
-            f"{path} does not hold what a video shows, as replays of an earlier swarm-mj; record "
-            "it again"
-        ) from error
+        lack = "does not hold what a video shows, as replays of an earlier swarm-mj"
+        raise ValueError(f"{path} {lack}; record it again") from error
 
 
 def _columns(path: Path) -> Columns:

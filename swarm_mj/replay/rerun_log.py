@@ -109,15 +109,13 @@ class RerunLog:
         """Write circles; `row` as for `things`."""
         self.layer(path, row, centers=centre, half_sizes=np.full(centre.shape, radius_m))
 
-    def mismatch_lines(
-        self, path: str, links: LinkRows, lines_m: Float[np.ndarray, "L 2 A"]
-    ) -> None:
+    def mismatch_lines(self, path: str, links: LinkRows, at_m: Float[np.ndarray, "L 2 A"]) -> None:
         """Write a line for each of these links; those who click on one read its numbers."""
         self.fixed_layer(path)
         window = self.log.mismatch.window
         per_snapshot = np.bincount(links["row"], minlength=len(window))
         colours = shades(path.rsplit("/")[-1], links)
-        columns = LAYERS[path.replace("others/", "")].kind.columns(strips=lines_m, colors=colours)
+        columns = LAYERS[path.replace("others/", "")].kind.columns(strips=at_m, colors=colours)
         values: dict[str, Any] = {name: links[name] for name in NUMBERS}
         numbers = rr.AnyValues.columns(**values)
         parts = (part for each in (columns, numbers) for part in each.partition(per_snapshot))

@@ -70,8 +70,7 @@ def _draw_ground(out: RerunLog, mission: Mission) -> None:
     out.fixed_layer("scene/grid", strips=lifted(np.array(strips), GRID_M))
     half = mission.half_side_m
     outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
-    name = "walls" if mission.has_walls else "outline"
-    out.fixed_layer(f"arena/area/{name}", strips=[outline])
+    out.fixed_layer(f"arena/area/{'walls' if mission.has_walls else 'outline'}", strips=[outline])
 
 
 def square_m(ground: Ground) -> float:

@@ -43,10 +43,8 @@ def has_display() -> bool:
 def view_command(*paths: Path) -> list[str]:
     """Return the command that opens replays in a window; raise ValueError without a display."""
     if not has_display():
-        raise ValueError(
-            "there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use "
-            "`swarm-mj replay --web FILE`, or `--video FILE.mp4` for a video"
-        )
+        ways = "`swarm-mj replay --web FILE`, or `--video FILE.mp4` for a video"
+        raise ValueError(f"there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use {ways}")
     return [*VIEWER, *map(str, paths)]
 
 

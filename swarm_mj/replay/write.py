@@ -120,8 +120,7 @@ def _draw_robots(out: RerunLog) -> None:
     radius_m = 2.0 * RING_SHARE * out.ground.reach_m
     out.rings("arena/ego", where, radius_m, row)
     # The name is a point's label, for rerun misplaces an ellipse's.
-    name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
-    out.fixed("arena/ego/name", name)
+    out.fixed("arena/ego/name", rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True))
     out.layer("arena/ego/name", row, positions=where - (0.0, 3.0 * radius_m))
 
 

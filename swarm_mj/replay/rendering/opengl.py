@@ -44,10 +44,8 @@ def check_choice() -> str:
     """Return MUJOCO_GL in lower case; raise ValueError for a name by which MuJoCo cannot load."""
     chosen = os.environ.get(CHOICE, "").lower().strip()
     if chosen and chosen not in (*NAMES, *ON, *OFF):
-        raise ValueError(
-            f"the environment variable {CHOICE} must be one of {', '.join(NAMES)} or off, not "
-            f"{chosen!r}; unset it"
-        )
+        rule = f"the environment variable {CHOICE} must be one of {', '.join(NAMES)} or off"
+        raise ValueError(f"{rule}, not {chosen!r}; unset it")
     return chosen
 
 
@@ -78,10 +76,8 @@ def _first_that_works() -> str:
     if found is None:
         raise OSError(f"neither EGL nor OSMesa works here; {WAY_OUT}")
     if settled and found != settled:
-        raise OSError(
-            f"another library has chosen {settled}, which does not work here; "
-            f"set {CHOICE}={found} before Python starts"
-        )
+        way_on = f"set {CHOICE}={found} before Python starts"
+        raise OSError(f"another library has chosen {settled}, which does not work here; {way_on}")
     if preset != found:  # MuJoCo refuses to draw by another back end than PyOpenGL's
         os.environ.pop(PYOPENGL, None)
     return found

@@ -79,14 +79,13 @@ class SceneRenderer(ExitStack):
         functions.mj_camlight(self._model, data)
         if not self._mission.has_walls and self._floor >= 0:
             # By whole tiles, so that the pattern stands still under a team that flies on.
-            tiles = np.round(footage.ground.centre_m[row] / TILE_M)
-            data.geom_xpos[self._floor, :2] = tiles * TILE_M
+            data.geom_xpos[self._floor, :2] = TILE_M * np.round(
+                footage.ground.centre_m[row] / TILE_M
+            )
         camera, free = self.camera(footage, row), MjvCamera()
         camera.aim(free)
-        everything = mjtCatBit.mjCAT_ALL.value
-        functions.mjv_updateScene(
-            self._model, data, self._options, None, free, everything, self._scene
-        )
+        kinds = mjtCatBit.mjCAT_ALL.value
+        functions.mjv_updateScene(self._model, data, self._options, None, free, kinds, self._scene)
         markers.draw_markers(self._scene, footage, row, camera)
         picture = np.empty((height, width, 3), np.uint8)
         whole = MjrRect(0, 0, width, height)

@@ -40,15 +40,11 @@ class Movie(ExitStack):
             raise ValueError(f"a video shows 1 or {len(STRIPS)} missions, not {len(footages)}")
         # One scale for both: by it the fresher team is seen in full, and the other is older still.
         scale = min(each.facts.full_scale for each in footages)
-        self._footages = [
-            replace(each, facts=replace(each.facts, full_scale=scale)) for each in footages
-        ]
+        self._footages = [replace(x, facts=replace(x.facts, full_scale=scale)) for x in footages]
         self._num_frames, width, height = style.num_frames, style.width, style.height
         bottom = height - round(STRIPS[len(footages) - 1] * height)
         edges = np.linspace(0, width, len(footages) + 1).round().astype(int).tolist()
-        self._boxes = [
-            drawing.Box(left, 0, right, bottom) for left, right in itertools.pairwise(edges)
-        ]
+        self._boxes = [drawing.Box(a, 0, b, bottom) for a, b in itertools.pairwise(edges)]
         self._text = max(9, round(min(TEXT * height, 0.05 * self._boxes[0].right)))
         pad = self._text // 2
         middle, top = pad + round(LEGEND * width), bottom + pad
@@ -78,9 +74,8 @@ class Movie(ExitStack):
         """Return the picture of these windows, one of each mission, from 0."""
         picture = self._empty.copy()
         draw = ImageDraw.Draw(picture)
-        parts = zip(
-            self._footages, rows, self._boxes, self._renderers, palette.FILM_CURVES, strict=False
-        )
+        curves = palette.FILM_CURVES
+        parts = zip(self._footages, rows, self._boxes, self._renderers, curves, strict=False)
         for footage, row, box, renderer, curve in parts:
             picture.paste(Image.fromarray(renderer.frame(footage, row)), (box.left, box.top))
             drawing.draw_title(draw, footage, row, box, self._text, curve)
@@ -144,13 +139,9 @@ def encode_gif(pictures: Iterable[Picture], style: VideoStyle, samples: Sequence
     rgb = np.stack([repeated >> shift & 255 for shift in (16, 8, 0)], axis=-1)
     montage = Image.fromarray(rgb[None].astype(np.uint8))
     colours = montage.quantize(NUM_COLOURS, method=Image.Quantize.MEDIANCUT)
-    images = (
-        Image.fromarray(picture).quantize(palette=colours, dither=Image.Dither.NONE)
-        for picture in pictures
-    )
+    dither = Image.Dither.NONE
+    images = (Image.fromarray(x).quantize(palette=colours, dither=dither) for x in pictures)
     content = io.BytesIO()
-    lasts_ms = round(1000.0 / style.fps)
-    next(images).save(
-        content, "gif", save_all=True, append_images=images, duration=lasts_ms, loop=0
-    )
+    each_ms = round(1000.0 / style.fps)
+    next(images).save(content, "gif", save_all=True, append_images=images, duration=each_ms, loop=0)
     return content.getvalue()
