@@ -183,9 +183,7 @@ def evaluate(
 def study_needs(study: Study, num_jobs: int) -> Needs:
     """Return the memory and disk of a study: a batch in each process, and the results of all."""
     batches = study.batches
-    largest = max(
-        missions_memory(batch.policy, batch.mission, len(batch.seeds)) for batch in batches
-    )
+    largest = max(missions_memory(x.policy, x.mission, len(x.seeds)) for x in batches)
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     under_way = min(num_jobs, len(batches)) * largest
     return Needs(
@@ -196,10 +194,9 @@ def study_needs(study: Study, num_jobs: int) -> Needs:
 
 def _check_named(kind: str, part: object) -> None:
     if not isinstance(part, str | Path | None):
-        raise TypeError(
-            f'evaluate takes the {kind} by name, such as "my_file:Name", not {part!r:.80}: it '
-            "flies missions in several processes, which each make their own"
-        )
+        why = "it flies missions in several processes, which each make their own"
+        rule = f'evaluate takes the {kind} by name, such as "my_file:Name"'
+        raise TypeError(f"{rule}, not {part!r:.80}: {why}")
 
 
 def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:

@@ -118,9 +118,9 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     return rows
 
 
-def _cost(
-    numbers: Mapping[str, Any], key: str, name: str, unit: str, digits: int
-) -> dict[str, str]:
-    mean, first, last = (f"{numbers[f'{key}_{x}']:.{digits}f}" for x in ("mean", "first", "last"))
-    ends = f"{first} to {last} {unit}"
-    return {f"{name}, mean": f"{mean} {unit}", "  first to last window": ends}
+def _cost(values: Mapping[str, Any], key: str, name: str, unit: str, digits: int) -> dict[str, str]:
+    mean, first, last = (f"{values[f'{key}_{x}']:.{digits}f}" for x in ("mean", "first", "last"))
+    return {
+        f"{name}, mean": f"{mean} {unit}",
+        "  first to last window": f"{first} to {last} {unit}",
+    }

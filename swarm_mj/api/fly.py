@@ -134,23 +134,18 @@ def mission_of(
         return make_mission(**({} if task is None else {"task": task}), **mission_fields)
     if mission_fields:
         given = ", ".join(f"{name}={value!r}" for name, value in mission_fields.items())
-        raise TypeError(
-            f"you gave a finished mission, so {', '.join(mission_fields)} must be part of it: "
-            f"dataclasses.replace(mission, {given})"
-        )
+        rule = f"you gave a finished mission, so {', '.join(mission_fields)} must be part of it"
+        raise TypeError(f"{rule}: dataclasses.replace(mission, {given})")
     return task
 
 
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     """Return the memory and disk that a flight takes."""
-    memory = registry.missions_memory(policy, mission)
-    memory += needs.FLYING - needs.LIBRARIES
+    memory = registry.missions_memory(policy, mission) + (needs.FLYING - needs.LIBRARIES)
     if not is_recorded:
         return Needs(memory=memory)
-    return Needs(
-        memory=memory + IN_MEMORY.of(mission, mission.num_windows),
-        file=ON_DISK.of(mission, mission.num_windows),
-    )
+    num = mission.num_windows
+    return Needs(memory=memory + IN_MEMORY.of(mission, num), file=ON_DISK.of(mission, num))
 
 
 def fly_mission(

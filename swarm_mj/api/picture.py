@@ -99,8 +99,7 @@ def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     line["color"] = _rgb(palette.WALL)
     axes.add_patch(Rectangle((low_m, low_m), side_m, side_m, fill=False, zorder=1.0, **line))
     shown = [Line2D([], [], label="wall of the area" if mission.has_walls else "area", **line)]
-    model = scene.compose(mission, scene=footage.scene).compile()
-    obstacles = arenas.obstacles_of(model)
+    obstacles = arenas.obstacles_of(scene.compose(mission, scene=footage.scene).compile())
     if len(obstacles.kind) > 0:
         inside, edge = _rgb(palette.OUTLINE), _rgb(palette.WALL)
         for outline_m in outlines.footprints(obstacles, state.ROBOT_HEIGHT_M):
@@ -133,16 +132,9 @@ def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
     colours, edge = footage.colours[row] / 255.0, _rgb(palette.BACKGROUND)
     axes.scatter(x, y, s=size, c=colours, edgecolors=edge, linewidths=0.8, zorder=4.0)
     own, beside_pt = footage.ego, 0.7 * _size_pt(footage)
-    axes.annotate(
-        f"r{own}",
-        (x[own], y[own]),
-        (beside_pt, beside_pt),
-        textcoords="offset points",
-        color=_rgb(palette.EGO),
-        fontsize=TEXT_PT,
-        fontweight="bold",
-        zorder=6.0,
-    )
+    look: dict[str, Any] = {"color": _rgb(palette.EGO), "fontsize": TEXT_PT, "fontweight": "bold"}
+    place: dict[str, Any] = {"xytext": (beside_pt, beside_pt), "textcoords": "offset points"}
+    axes.annotate(f"r{own}", (x[own], y[own]), zorder=6.0, **place, **look)
     shown = [_dot(f"r{own}, whose knowledge is shown", palette.EGO)]
     if np.any(np.isnan(footage.known_age[row]) & footage.is_on[row]):
         shown.append(_dot("never heard of", palette.UNKNOWN))
@@ -169,8 +161,9 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
         how = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0028, "headwidth": 4.5}
         x, y, along_x, along_y = np.hstack([start_m, along_m]).T
         axes.quiver(x, y, along_x, along_y, color=colour, zorder=5.0, alpha=0.9, **how)
-        label = f"packet {fate}"
-        shown.append(Line2D([], [], color=colour, marker=">", markevery=[1], label=label))
+        shown.append(
+            Line2D([], [], color=colour, marker=">", markevery=[1], label=f"packet {fate}")
+        )
     return shown
 
 
@@ -213,11 +206,8 @@ def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
     axes = figure.add_axes(place)
     ages = np.linspace(0.0, full, 256)
     axes.imshow(palette.age_colours(ages, full)[None], aspect="auto", extent=(0.0, full, 0.0, 1.0))
-    axes.set_title(
-        f"age of what r{footage.ego} knows of a robot [windows]",
-        fontsize=TEXT_PT,
-        color=_rgb(palette.TEXT),
-    )
+    title = f"age of what r{footage.ego} knows of a robot [windows]"
+    axes.set_title(title, fontsize=TEXT_PT, color=_rgb(palette.TEXT))
     axes.set_xticks([0.0, full / 2.0, full], ["0", f"{full / 2.0:g}", f"{full:g} or more"])
     axes.tick_params(colors=_rgb(palette.WALL), labelcolor=_rgb(palette.SENT), labelsize=SMALL_PT)
     axes.set_yticks([])
@@ -226,14 +216,7 @@ def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
 
 
 def _draw_legend(figure: Figure, shown: list[Line2D], below_in: float) -> None:
-    figure.legend(
-        handles=shown,
-        loc="upper left",
-        bbox_to_anchor=((TEXT_IN - 0.05) / WIDTH_IN, (below_in - 0.4) / HEIGHT_IN),
-        frameon=False,
-        fontsize=TEXT_PT,
-        labelcolor=_rgb(palette.SENT),
-        borderpad=0.0,
-        borderaxespad=0.0,
-        labelspacing=0.6,
-    )
+    place = (TEXT_IN - 0.05) / WIDTH_IN, (below_in - 0.4) / HEIGHT_IN
+    look: dict[str, Any] = {"frameon": False, "fontsize": TEXT_PT, "labelcolor": _rgb(palette.SENT)}
+    room: dict[str, Any] = {"borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.6}
+    figure.legend(handles=shown, loc="upper left", bbox_to_anchor=place, **look, **room)

@@ -84,10 +84,8 @@ class Run:
 
     def __repr__(self) -> str:
         age, window_s = self.summary.aoi_mean, self.mission.window_s
-        return (
-            f"<Run {self.title}: age of information {age:.2f} windows ({age * window_s:.2g} s) "
-            f"over {len(self.windows)} windows>"
-        )
+        cost = f"age of information {age:.2f} windows ({age * window_s:.2g} s)"
+        return f"<Run {self.title}: {cost} over {len(self.windows)} windows>"
 
     def _repr_html_(self) -> str:
         """Return the numbers as a table, for notebooks."""
@@ -191,8 +189,7 @@ class Run:
 
     def report(self, replay: Path | None = None) -> dict[str, Any]:
         """Return config and summary, as `swarm-mj fly --json` writes them."""
-        written = None if replay is None else str(replay)
-        return {"config": dict(self.config), **self.summary, "replay": written}
+        return {"config": dict(self.config), **self.summary, "replay": replay and str(replay)}
 
     def save(self, path: str | Path) -> Path:
         """Write the flight, replacing the file if it exists; return the path.

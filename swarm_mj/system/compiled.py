@@ -79,11 +79,9 @@ class _Loop(CPUDispatcher):
 
     @held_interrupts()
     def compile(self, sig: Any) -> Any:  # noqa: ANN401 - numba's
-        """Let a Ctrl-C wait until a function is compiled, or loaded from the cache.
-
-        LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
-        made, and the process fails later, or crashes when it ends.
-        """
+        """Let a Ctrl-C wait until a function is compiled, or loaded from the cache."""
+        # LLVM calls back into Python meanwhile. There an exception is lost, a function is left half
+        # made, and the process fails later, or crashes when it ends.
         entry = super().compile(sig)
         for result in self.overloads.values():
             for env in result._find_referenced_environments():
@@ -102,11 +100,10 @@ class _PartCompiler(Compiler):
 
 
 class _Part(JITCodeLibrary):
-    """Code that is optimised and made a machine's where it is called, and not before.
+    """Code that is optimised and made a machine's where it is called, and not before."""
 
-    By itself nobody calls it, and to optimise it alone, then again in every caller and in theirs,
-    takes half of the time.
-    """
+    # By itself nobody calls it, and to optimise it alone, then again in every caller and in theirs,
+    # takes half of the time.
 
     def _optimize_final_module(self) -> None:
         """Leave that to the function that it becomes a part of."""
@@ -128,12 +125,10 @@ class _Cache(caching.FunctionCache):
     """A function's cache, which the digest of its files keeps up to date."""
 
     def __init__(self, function: Callable[..., Any]) -> None:
-        """Let numba compare the digest before it unpickles the rest of an index.
-
-        An index of other code may name classes that no longer exist, which would end the program,
-        and so may one of the same file imported by another name. numba compares its own version
-        first, so digest and name join it.
-        """
+        """Let numba compare the digest before it unpickles the rest of an index."""
+        # An index of other code may name classes that no longer exist, which would end the program,
+        # and so may one of the same file imported by another name. numba compares its own version
+        # first, so digest and name join it.
         super().__init__(function)
         file = Path(function.__code__.co_filename)
         self._cache_file._version += sources_digest(file) + function.__module__

@@ -177,8 +177,7 @@ def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
     limits = ""
     if "low" in allowed:
-        is_within = isinstance(value, Real) and allowed["low"] <= value <= allowed["high"]
-        is_allowed = is_allowed and is_within
+        is_allowed &= isinstance(value, Real) and allowed["low"] <= value <= allowed["high"]
         limits = f" from {range_of(spec)}"
     if not is_allowed:
         shown = repr(value) if isinstance(value, str) else value

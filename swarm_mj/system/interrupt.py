@@ -73,11 +73,9 @@ def held_interrupts() -> Iterator[None]:
 def _heard_by(
     handler: Callable[[int, FrameType | None], object], in_place_of: Container[Any] | None = None
 ) -> Iterator[None]:
-    """Replace the handlers of interrupts, as far as they can be put back.
-
-    Only the main thread may do so, and a handler that is not Python's cannot be put back. One that
-    ignores a signal stays: a shell shields its job from Ctrl-C, `nohup` from hang-ups.
-    """
+    """Replace the handlers of interrupts, as far as they can be put back."""
+    # Only the main thread may do so, and a handler that is not Python's cannot be put back. One
+    # that ignores a signal stays: a shell shields its job from Ctrl-C, `nohup` from hang-ups.
     is_main = threading.current_thread() is threading.main_thread()
     found = {number: signal.getsignal(number) for number in INTERRUPTS} if is_main else {}
     before = {

@@ -54,10 +54,9 @@ def check_fits(
     The message says what lacks and how much, what to choose instead (the way out), and how to start
     all the same (the way on).
     """
-    asked = needs.memory + ADDRESSES
     has = [
         ("of memory", needs.memory, free_memory(), "are free"),
-        ("of address space", asked, free_addresses(), "are left by ulimit -v"),
+        ("of address space", needs.memory + ADDRESSES, free_addresses(), "are left by ulimit -v"),
     ]
     if output is not None:
         has += [
@@ -133,10 +132,8 @@ def _limit(which: int) -> float:
 
 
 def _left_by_groups() -> Iterator[int]:
-    """Yield what this process's control groups leave it, such as a container's.
-
-    A limit may be a parent's. Where there is none, the file says `max`, or there is no file.
-    """
+    """Yield what this process's control groups leave it, such as a container's."""
+    # A limit may be a parent's. Where there is none, the file says `max`, or there is no file.
     groups = Path("/proc/self/cgroup")
     for line in groups.read_text().splitlines() if groups.exists() else ():
         _, kind, path = line.split(":", 2)

@@ -80,8 +80,5 @@ def missing(module: str, what: str, way_out: str = "") -> str:
     except metadata.PackageNotFoundError:  # a checkout that was never installed
         wanted = []
     versions = next((str(each.specifier) for each in wanted if each.name == package), "")
-    instead = f", or {way_out}" if way_out else ""
-    return (
-        f"{what} needs {package}, which is not installed; "
-        f"pip install '{package}{versions}'{instead}"
-    )
+    way = f"pip install '{package}{versions}'" + (f", or {way_out}" if way_out else "")
+    return f"{what} needs {package}, which is not installed; {way}"

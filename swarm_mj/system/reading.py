@@ -18,7 +18,6 @@ import msgspec
 from swarm_mj.system.fields import FORMER_NAMES
 
 Kind = TypeVar("Kind")
-
 Row = tuple[int, dict[str, str]]
 
 MAX_LETTERS = 160  # of what msgspec says
@@ -120,11 +119,9 @@ def _made(kind: type[Any], value: object) -> object:
 
 
 def _with_all_keys(value: object, kind: object, at: str = "$") -> object:
-    """Return a dataclass's plain values by the present names of its fields, nested ones included.
-
-    msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file would
-    pass. Fields that say `may_lack` are newer than some files: there they have their default.
-    """
+    """Return a dataclass's plain values by its fields' present names, nested ones included."""
+    # msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file
+    # would pass. Fields that say `may_lack` are newer than some files: there they have defaults.
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
     known: dict[Any, Any] = {spec.name: spec for spec in fields(kind)}
@@ -134,9 +131,6 @@ def _with_all_keys(value: object, kind: object, at: str = "$") -> object:
     for key in named.keys() - known.keys():
         raise ValueError(f"Object contains unknown field `{key!s:.40}` - at `{at}`")
     for name in known.keys() - named.keys():
-        if known[name].metadata.get("may_lack"):
-            continue
-        raise ValueError(f"Object missing required field `{name}` - at `{at}`")
-    return {
-        key: _with_all_keys(each, known[key].type, f"{at}.{key}") for key, each in named.items()
-    }
+        if not known[name].metadata.get("may_lack"):
+            raise ValueError(f"Object missing required field `{name}` - at `{at}`")
+    return {key: _with_all_keys(x, known[key].type, f"{at}.{key}") for key, x in named.items()}

@@ -41,9 +41,8 @@ def tell_cores(number: int, what: str = "jobs") -> None:
     """Say in one line if there are more jobs than cores to run them, or more threads."""
     cores = num_cores()
     if number > cores:
-        plain_console(is_error=True).print(
-            f"{number} {what} share {cores} cores: those above {cores} cost memory and save no time"
-        )
+        others = f"those above {cores} cost memory and save no time"
+        plain_console(is_error=True).print(f"{number} {what} share {cores} cores: {others}")
 
 
 def named_values(title: str, rows: dict[str, str], caption: str | None = None) -> Table:

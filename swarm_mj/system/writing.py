@@ -154,10 +154,8 @@ def _locked(lock: Path, path: Path) -> int:
         except BlockingIOError:
             owner = os.read(number, 20).decode(errors="replace") or "of another user"
             os.close(number)
-            raise ValueError(
-                f"{path} is being written by process {owner}; wait until it is done, end it, or "
-                "name another"
-            ) from None
+            ways = "wait until it is done, end it, or name another"
+            raise ValueError(f"{path} is being written by process {owner}; {ways}") from None
         except OSError:  # some network disks know no locks
             return number
         # Its last owner may have removed it between the two steps: then it locks no name.
@@ -191,11 +189,9 @@ def _part(path: Path) -> Iterator[tuple[Path, BinaryIO]]:
 
 
 def _sweep(target: Path) -> None:
-    """Remove what killed processes had not finished.
-
-    The kernel gives their locks back. A process number would not tell whether they are alive: other
-    machines and containers may share the disk, and numbers are given again.
-    """
+    """Remove what killed processes had not finished."""
+    # The kernel gives their locks back. A process number would not tell whether they are alive:
+    # other machines and containers may share the disk, and numbers are given again.
     for part in target.parent.glob(f".{glob.escape(target.name)}.{'[0-9a-f]' * 8}.part"):
         with suppress(OSError), part.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
