@@ -61,10 +61,9 @@ def noise(steps_us: Sequence[float]) -> str:
     least, most = min(steps_us), max(steps_us)
     spread = most / least - 1.0
     busy = "; the machine was busy, so measure again when it is not" if spread > BUSY else ""
-    return (
-        f"noise: the plain step was measured {len(steps_us)} times, from {least:.2f} to {most:.2f} "
-        f"µs. Other numbers, too, may be off by {spread:.0%}{busy}."
-    )
+    measured = f"measured {len(steps_us)} times, from {least:.2f} to {most:.2f} µs"
+    others = f"Other numbers, too, may be off by {spread:.0%}{busy}."
+    return f"noise: the plain step was {measured}. {others}"
 
 
 def _check_teams(teams: Collection[object]) -> None:

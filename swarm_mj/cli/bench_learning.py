@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 import torch
@@ -72,28 +73,18 @@ def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float)
     settings = usual_settings(credit, mission, (mission.num_robots,))
     ppo, share = settings.ppo, settings.groups
     # One group of missions, and minibatches of about the usual size, so that it ends in time.
-    fewer = replace(
-        settings,
-        threads=threads,
-        missions=settings.missions // share,
-        groups=1,
-        ppo=replace(ppo, num_minibatches=max(1, ppo.num_minibatches // share)),
-    )
-    model = make_model(fewer)
-
-    def rollout() -> None:
-        model.learn(1, reset_num_timesteps=False, log_interval=10**9)
-
-    return 1e6 * ppo.num_steps * fewer.missions / microseconds(rollout, seconds)
+    ppo = replace(ppo, num_minibatches=max(1, ppo.num_minibatches // share))
+    missions = settings.missions // share
+    fewer = replace(settings, threads=threads, missions=missions, groups=1, ppo=ppo)
+    learn = partial(make_model(fewer).learn, 1, reset_num_timesteps=False, log_interval=10**9)
+    return 1e6 * ppo.num_steps * missions / microseconds(learn, seconds)
 
 
-def _graphs(
-    mission: Mission, features: str, num_missions: int
-) -> tuple[torch.Tensor, torch.Tensor]:
+def _graphs(mission: Mission, features: str, number: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the features and parents of all robots' nodes after a warm-up."""
-    swarm, policy = Swarm(mission, range(num_missions)), RoundRobin()
+    swarm, policy = Swarm(mission, range(number)), RoundRobin()
     extractor = make_extractor(features, mission)
-    extractor.start(num_missions, mission.num_robots)
+    extractor.start(number, mission.num_robots)
     for _ in range(WARM_UP_WINDOWS):
         extractor.graphs(swarm.views)
         swarm.step(policy)

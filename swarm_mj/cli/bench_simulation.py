@@ -121,38 +121,32 @@ def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterato
     The jobs share the baselines' missions. The time to start them is included.
     """
     for policy in (*BASELINES, "greedy-oracle"):  # compiles, if it never has
-        _flying_s(policy, num_episodes=1, mission=replace(MISSION, num_windows=1))
-    baselines_s = _flying_s(*BASELINES, num_episodes=num_episodes, num_jobs=num_jobs)
+        _flying_s(policy, episodes=1, mission=replace(MISSION, num_windows=1))
+    baselines_s = _flying_s(*BASELINES, episodes=num_episodes, jobs=num_jobs)
     step_us = plain_step_us(seconds / 4)
     window_us = 1e6 * baselines_s / (len(BASELINES) * num_episodes * MISSION.num_windows)
     yield Row(f"{', '.join(BASELINES)}, --jobs {num_jobs}", baselines_s, "{:.1f} s")
     yield Row("  one window of one mission, with start-up", window_us)
     yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
     num_oracles = min(num_episodes, ORACLE_EPISODES)
-    oracle_s = _flying_s("greedy-oracle", num_episodes=num_oracles)
+    oracle_s = _flying_s("greedy-oracle", episodes=num_oracles)
     yield Row("greedy-oracle, one mission", oracle_s / num_oracles, "{:.2f} s")
     for name, mission in PLANNED.items():
-        window_us = _planned_window_us(mission, seconds / 4)
-        yield Row(f"{name}: one window of one mission", window_us)
+        yield Row(f"{name}: one window of one mission", _planned_window_us(mission, seconds / 4))
     yield Row(PLAIN_STEP, step_us)
 
 
-def _flying_s(
-    *policies: str, num_episodes: int, num_jobs: int = 1, mission: Mission = MISSION
-) -> float:
+def _flying_s(*policies: str, episodes: int, jobs: int = 1, mission: Mission = MISSION) -> float:
     """Return the wall time of an evaluation's missions [s]."""
-    study = Study(policies=policies, regimes=(mission,), episodes=num_episodes)
+    study = Study(policies=policies, regimes=(mission,), episodes=episodes)
     start_s = time.perf_counter()
-    list(Local(num_jobs=num_jobs).run(fly_batch, study.batches))
+    list(Local(num_jobs=jobs).run(fly_batch, study.batches))
     return time.perf_counter() - start_s
 
 
 def _planned_window_us(mission: Mission, seconds: float) -> float:
-    """Time a window of a mission that the planner flies [µs].
-
-    N windows are timed together, for N robots. These are two epochs of the planner, and each epoch
-    begins with a plan.
-    """
+    """Time a window of a mission that the planner flies [µs]."""
+    # N windows together, for N robots: two epochs of the planner, which each begin with a plan.
     swarm, planner = Swarm(mission, [0]), make_policy("planner", mission)
     swarm.start(planner)
 

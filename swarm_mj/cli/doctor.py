@@ -105,8 +105,7 @@ def tried() -> Iterator[Finding]:
     mend = "see what `swarm-mj fly` says"
     yield _of_trial(Finding("flying", "three robots fly", "broken", mend=mend), _TRIALS["flight"])
     for name, mend in RENDERING.items():
-        group = "rendering without a display"
-        failed = Finding(group, f"MUJOCO_GL={name}", "absent", mend=mend)
+        failed = Finding("rendering without a display", f"MUJOCO_GL={name}", "absent", mend=mend)
         # What else is set for PyOpenGL would bind all of them to one back end.
         yield _of_trial(failed, _TRIALS["render"], {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name})
 

@@ -156,8 +156,6 @@ def _progress_file(options: StudyFlags, outputs: Iterable[Output]) -> Path | Non
     kept = flying.progress_path(options.files[0])
     check_outputs(Output("progress", kept), *outputs)  # also against a link to the progress
     if kept.exists() and not (options.resume or options.force):
-        raise ValueError(
-            f"progress {kept} of an interrupted run exists; continue it with --resume, or start "
-            "over with --force"
-        )
+        ways = "continue it with --resume, or start over with --force"
+        raise ValueError(f"progress {kept} of an interrupted run exists; {ways}")
     return kept

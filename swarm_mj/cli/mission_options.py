@@ -69,9 +69,7 @@ def missions_of(
         if place in given:
             value = given[place]
             swept[spec.name] = dict.fromkeys(value) if isinstance(value, tuple) else [value]
-    missions = [
-        make_mission(**dict(zip(swept, values, strict=True))) for values in product(*swept.values())
-    ]
+    missions = [make_mission(**dict(zip(swept, x, strict=True))) for x in product(*swept.values())]
     check_in_use(swept, missions, called)
     # A fraction that rounds to no robot makes the missions of 0, which are flown once.
     made = (m if m.num_high_power else replace(m, high_power_fraction=0.0) for m in missions)
@@ -87,10 +85,8 @@ def check_in_use(
         is_on = (value in s.split(",") if value else s > 0.0 for s in states)
         if name in given and not any(is_on):
             shown = value or "above 0"
-            raise ValueError(
-                f"{called(name)} counts only with {called(switch)} {shown}; give that too, or "
-                f"leave {called(name)} out"
-            )
+            ways = f"give that too, or leave {called(name)} out"
+            raise ValueError(f"{called(name)} counts only with {called(switch)} {shown}; {ways}")
 
 
 def mission_flags(mission: Mission) -> str:

@@ -199,8 +199,7 @@ def _is_required(spec: Field[Any]) -> bool:
 
 
 def _add(group: argparse._ActionsContainer, spec: Field[Any]) -> None:
-    kind, about = settings.kind_of(spec), spec.metadata
-    place = _place(spec)
+    kind, about, place = settings.kind_of(spec), spec.metadata, _place(spec)
     how: dict[str, Any] = {"help": _help(spec)}
     if kind is bool:
         group.add_argument(*flags_of(spec), dest=place, action="store_true", **how)

@@ -84,14 +84,9 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
     """Print a line of each policy: those whose robots decide, then those of a centre."""
     console = Console(highlight=False)
     for is_centralised, heading in HEADINGS.items():
-        table = Table(
-            Column("policy", no_wrap=True),
-            Column(heading, no_wrap=True),
-            Column("packets", justify="right"),
-            box=SIMPLE_HEAD,
-            show_edge=False,
-            pad_edge=False,
-        )
+        columns = [Column(head, no_wrap=True) for head in ("policy", heading)]
+        table = Table(*columns, box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
+        table.add_column("packets", justify="right")
         for each in (each for each in facts if each["is_centralised"] == is_centralised):
             does = each["description"].partition("\n")[0].removesuffix(".")
             table.add_row(each["name"], does, f"{each['packet_bytes']:,} B")

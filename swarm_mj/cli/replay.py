@@ -91,10 +91,8 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
     file, *others = options.file
     if others:
         raise ValueError(f"a picture shows 1 replay, not {len(options.file)}; name one")
-    is_new = not options.force
-    check_outputs(
-        Output("picture", picture, ".png|.svg|.pdf"), inputs=options.file, must_be_new=is_new
-    )
+    written = Output("picture", picture, ".png|.svg|.pdf")
+    check_outputs(written, inputs=options.file, must_be_new=not options.force)
     for module in ("matplotlib", "rerun"):
         need(module, "a picture")
     quiet_matplotlib()
@@ -110,9 +108,8 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
 
 
 def _make_video(options: ReplayOptions, video: Path) -> int:
-    check_outputs(
-        Output("video", video, ".mp4|.gif"), inputs=options.file, must_be_new=not options.force
-    )
+    written = Output("video", video, ".mp4|.gif")
+    check_outputs(written, inputs=options.file, must_be_new=not options.force)
     suffix = video.suffix.lower()
     style = _style(options, suffix)
     for module in ("av", "PIL", "rerun"):
@@ -128,10 +125,8 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     raise_if_interrupted()  # an encoder may have swallowed it
     write_bytes(video, content)
     number, name = style.num_frames, shlex.quote(str(video))
-    plain_console().print(
-        f"Wrote {name}: {number / style.fps:.3g} s, {number} pictures of {style.width} by "
-        f"{style.height}, {len(content) / 1e6:.1f} MB"
-    )
+    about = f"{number / style.fps:.3g} s, {number} pictures of {style.width} by {style.height}"
+    plain_console().print(f"Wrote {name}: {about}, {len(content) / 1e6:.1f} MB")
     return 0
 
 

@@ -99,10 +99,8 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
         yield f"Stopped early: the last {run.limits.patience} evaluations brought no gain.{way_on}"
     if choice is None:
         if progress.best is not None:
-            yield (
-                "The policy kept is the best of the evaluations, on the same missions: so "
-                "its age is biased. A run that ends selects on fresh missions."
-            )
+            best = "the best of the evaluations, on the same missions: so its age is biased"
+            yield f"The policy kept is {best}. A run that ends selects on fresh missions."
         return
     if choice.decisions == 0:
         begun = "the policy given by --init" if run.init else "the untrained policy"

@@ -58,9 +58,7 @@ def asked_settings(
 
     `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
-    own = _part("", given)
-    network = _part("network", given)
-    asked = _part("mission", given)
+    own, network, asked = (_part(part, given) for part in ("", "network", "mission"))
     sizes = own.get("robots", (Mission().num_robots,))
     mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
     check_in_use(asked, [mission], FLAGS.__getitem__)
@@ -68,8 +66,7 @@ def asked_settings(
     if init is not None:
         same = {name: getattr(init, name) for name in ("network", "features", "silence_logit")}
         training = replace(training, **same)
-        places = [place for place in given if place.startswith(("features", "network"))]
-        shape = {place: given[place] for place in places}
+        shape = {at: x for at, x in given.items() if at.startswith(("features", "network"))}
         refuse_others(shape, training, f"the policy {init_path}")
         check_named(init.features, own_names(given), f"policy {init_path}")
     missions = _missions(own.get("missions"), training.missions, len(sizes))
@@ -88,10 +85,8 @@ def asked_settings(
     for size in training.robots:
         check_whole("training", replace(mission, num_robots=size))
     if training.reward == "velocity-variance" and mission.task != "flocking":
-        raise ValueError(
-            "reward velocity-variance depends on who talks only if the robots flock; add --task "
-            "flocking"
-        )
+        rule = "reward velocity-variance depends on who talks only if the robots flock"
+        raise ValueError(f"{rule}; add --task flocking")
     return training
 
 
