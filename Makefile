@@ -138,7 +138,7 @@ format: $(DEV)
 # The paper's methods beside two of ours, and ours beside the paper's simplest.
 PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN generalized from 0.25" \
   "GNN trained at each size" "GNN generalized from 40" \
-  "GNN with credit per robot" "GNN trained on AoI" "GNN trained on velocity variance"
+  "GNN trained on AoI" "GNN trained on velocity variance"
 OURS := planner "planner --payload none" gnn spatial-tdma tdma gossip aloha random-flooding greedy-oracle
 
 figures: setup

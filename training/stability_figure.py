@@ -2,7 +2,7 @@
 
     python training/stability_figure.py
 
-Draws what `training/reproduce.py` left of Fig. 6's trainings: assets/figures/stability.svg and
+Draws what `training/reproduce.py` left of the trainings in flocks: assets/figures/stability.svg and
 .png.
 """
 
@@ -58,8 +58,8 @@ class StabilityFigure:
         """Draw the figure; return the exit code."""
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
-        curves = read_curves(self.results / "fig6-curves.csv")
-        figure = draw(curves, read_origin(self.results / "fig6-trainings.csv"))
+        curves = read_curves(self.results / "stability-curves.csv")
+        figure = draw(curves, read_origin(self.results / "stability-trainings.csv"))
         for path in paths:
             save(figure, path)
         return 0

@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from PIL import Image
 
-from swarm_mj.evaluation.figures.curves import results_of
+from swarm_mj.evaluation.figures.curves import method_of, results_of
 from swarm_mj.evaluation.figures.drawing import caption
 from swarm_mj.evaluation.published import FLOCK, RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results
@@ -56,7 +56,7 @@ def test_a_figure_s_caption_is_that_of_its_results(results, name, kind):
     figure, rows = RESULT_FIGURES[name], [*rows, *reproduced(preset, name)]
     found = results_of(figure, rows)
     if preset == "paper":
-        found = [result for result in found if result.policy in drawn_methods()]
+        found = [result for result in found if method_of(result) in drawn_methods()]
     assert written(preset, name, kind) == caption(figure, found), REMAKE
 
 

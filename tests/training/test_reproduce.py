@@ -214,7 +214,7 @@ def test_an_experiment_flies_all_points_of_its_figure(figure):
         assert {each["network.receptive_field"] for each in hops} == set(shown.xs)
 
 
-@pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
+@pytest.mark.parametrize("figure", program.FIGURES)
 def test_full_has_the_authors_budget_and_never_stops_before(figure):
     work = program.read_work(figure, program.Settings(scale="full"))
     options = parse(next(iter(work.trainings.values())))[1]
@@ -223,7 +223,7 @@ def test_full_has_the_authors_budget_and_never_stops_before(figure):
     parse(work.flights[0][1])
 
 
-@pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
+@pytest.mark.parametrize("figure", program.FIGURES)
 def test_committed_results_are_of_the_experiment_as_it_stands(figure):
     work = program.read_work(figure, program.Settings())
     assert work.is_finished, "make reproduce ARGS=--force makes them anew"
