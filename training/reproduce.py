@@ -4,7 +4,7 @@
     make reproduce SCALE=quick    # the same; then `make figures` draws what it left
 
 What is trained and flown, and with which options, stands in `training/reproduce/`, one file a
-figure. `quick` has a hundredth of the authors' budget, `full` all of it.
+figure. `quick` has one to three hundredths of the authors' budget, `full` all of it.
 What `training/results/reproduce/SCALE` has of the same file is kept; `--force` makes it again. An
 interrupted run goes on where it broke off, as long as the commit is the same.
 """
