@@ -40,7 +40,7 @@ class PpoSettings:
     least_share: float = setting(0.1, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
     num_minibatches: int = setting(10, low=1, high=10**6)  # into which a rollout is divided
-    num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)  # passes over a rollout
+    num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
     discount: float = setting(0.0, HELP["discount"], low=0.0, high=1.0)
     gae_lambda: float = setting(0.9, low=0.0, high=1.0)
     clip: float = setting(0.2, low=1e-12, high=1e6)  # of the probability ratio

@@ -41,12 +41,11 @@ class BufferFeatures(FeatureExtractor):
         states = buffers.position_m, buffers.velocity_mps, buffers.parent
         _write_states(*states, is_known, mission.range_m, mission.max_velocity_mps, node)
         _write_counts(node)
+        is_close = node["distance"] <= ADDRESS_RANGES / FAR_RANGES
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(FEATURES)),
             parent=buffers.parent.reshape(rows),
-            may_address=(~is_known | (node["distance"] <= ADDRESS_RANGES / FAR_RANGES)).reshape(
-                rows
-            ),
+            may_address=(~is_known | is_close).reshape(rows),
             has_turn=np.zeros(rows[0], dtype=np.bool_),
         )
 

@@ -46,8 +46,8 @@ class Plan:
         """
         is_certain = not links.is_doubtful if is_certain is None else is_certain
         timestamp = np.full_like(links.received_mw, NEVER) if timestamp is None else timestamp
-        self._problem = problem_of(links, settings, is_certain=is_certain)
         self._problem_of = partial(problem_of, settings=settings, is_certain=is_certain)
+        self._problem = self._problem_of(links)
         self._links_from, self._drawn_slots = links_from, settings.drawn_slots
         self._timestamp = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)  # [slots]
         self._now = SLOTS_PER_WINDOW * now
