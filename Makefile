@@ -7,9 +7,11 @@ HASHES := tools/hashes.txt tools/hashes-dev.txt
 PIP := $(BIN)/python -m pip install --quiet --disable-pip-version-check
 UV := $(BIN)/uv pip install --python $(BIN)/python --quiet
 ARGS ?=
-SCALE ?= quick
+SCALE ?= paper
+STUDIES ?=
+BUDGET ?= quick
 
-.PHONY: help setup setup-dev fly bench check test test-all test-engines attack reference lock audit format figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check test test-all test-engines attack reference lock audit format results figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -21,8 +23,9 @@ help:
 	@echo "make check   formatter, linter and type checker"
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
-	@echo "make figures remake all figures; evaluates what training/results/ lacks of the paper's"
-	@echo "make reproduce  train and fly the paper's GNNs anew, for make figures; SCALE=full has its budget"
+	@echo "make results fly every table and figure of the docs, at one commit: hours; SCALE=smoke takes minutes"
+	@echo "make figures draw all figures from training/results/"
+	@echo "make reproduce  train the paper's GNNs anew, then fly them; BUDGET=full has the authors' budget"
 	@echo "make video   remake the moving picture (needs OpenGL, or libosmesa6)"
 	@echo "make picture remake the pictures of replays (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
@@ -141,12 +144,21 @@ PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN gen
   "GNN trained on AoI" "GNN trained on velocity variance"
 OURS := planner "planner --payload none" gnn spatial-tdma tdma gossip aloha random-flooding greedy-oracle
 
+# STUDIES="city channels" flies these tables only; an interrupted run continues.
+results: setup
+	$(BIN)/python training/results.py --scale $(SCALE) $(if $(STUDIES),--studies $(STUDIES)) $(ARGS)
+ifeq ($(SCALE),smoke)
+	$(BIN)/python tools/results_table.py --structure --results runs/smoke
+else
+	$(BIN)/python tools/results_table.py
+	$(MAKE) figures
+endif
+
 figures: setup
-	$(BIN)/python training/paper_figures.py $(ARGS)
 	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force
 	for name in fig2 fig3 fig4 fig5 fig6; do \
 	  $(BIN)/swarm-mj figures training/results/paper-*.csv \
-	    $$(ls training/results/reproduce/$(SCALE)/$$name.csv 2>/dev/null) \
+	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv 2>/dev/null) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
 	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig5 fig6 --policy $(OURS) \
@@ -160,7 +172,7 @@ figures: setup
 	$(BIN)/python tools/diagrams.py
 
 reproduce: setup
-	$(BIN)/python training/reproduce.py --scale $(SCALE) $(ARGS)
+	$(BIN)/python training/reproduce.py --scale $(BUDGET) --force $(ARGS)
 
 picture: setup
 	$(BIN)/swarm-mj fly --record replays/readme.rrd --force

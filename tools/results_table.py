@@ -1,132 +1,211 @@
-"""Results of the paper's figures as Markdown tables, ours with the published values beside them.
+"""The numbers in the README and the docs, written from the results between their markers.
 
-    python tools/results_table.py training/results/paper-*.csv
+    python tools/results_table.py            # writes them
+    python tools/results_table.py --check    # says which differ, and writes nothing
 
-One table per file, task, preset, fraction switched off and cost: policies down, the swept number
-across, mean ± standard error over missions, published values in brackets. A file of several bit
-rates has one table per team size, with the rates across.
+A table stands between `<!-- table: NAME -->` and `<!-- end -->`; `tables.toml` says what it shows.
+A number in a sentence stands between `<!-- value: RESULTS key=value ... {field:.1f} -->` and
+`<!-- end -->`: the field of the one row with these keys in `training/results/RESULTS.csv`.
 """
 
-import math
+import re
+import shlex
 import sys
-from collections.abc import Sequence
+import tomllib
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
+from functools import partial
+from importlib import import_module
 from pathlib import Path
-from statistics import mean
+from typing import Any
+
+from results_rows import Row, Rows, origin, read, select
 
 from swarm_mj.cli import script
-from swarm_mj.evaluation.published import SWEEPS
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, read_results
-from swarm_mj.mission.presets import bits_per_second
+from swarm_mj.cli.policies import facts_of
+from swarm_mj.evaluation.results import CARRIES_MORE
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
+from swarm_mj.system.writing import write_text
 
-COSTS = {
-    "aoi": ("age of information [windows]", 1),
-    "velocity_variance": ("velocity variance [m²/s²]", 3),
-}
+ROOT = Path(__file__).resolve().parent.parent
+PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
+TABLES: dict[str, Any] = tomllib.loads(Path(__file__).with_name("tables.toml").read_text("utf-8"))
+MARKER = re.compile(r"<!-- (table|value): (.*?) -->(.*?)<!-- end -->", re.DOTALL)
+AGE = "{aoi_mean:.1f} ± {aoi_sem:.1f}"
+PUBLISHED = (
+    " ({{published_{0}_mean:{1}}} ± {{published_{0}_sem:{1}}})"  # after what it is compared to
+)
+COSTS = (("aoi", ".1f"), ("velocity_variance", ".3f"))  # that the paper published, and their digits
+OWN = ("head", "results", "form", "fact")  # keys of a row or a column that no result has
 
 
-def table(results: Sequence[Result], cost: str) -> str:
-    """Return the table of one cost of one task and preset.
+def table(spec: dict[str, Any], folder: Path) -> str:
+    """Return a table as Markdown, with the origin of its numbers below.
 
-    Args:
-        results: Of one task and preset, and one fraction of robots switched off.
-        cost: `aoi` or `velocity_variance`.
-
-    Returns:
-        Markdown; the policies of least cost first.
+    Raises ValueError if a cell could be one of several results, or there is nothing to show.
     """
-    swept = "bit_rate" if _is_by_rate(results) else SWEEPS[results[0].task].x_name
-    xs = sorted({getattr(result, swept) for result in results}, key=_place)
-    if len({(result.policy, getattr(result, swept)) for result in results}) < len(results):
-        raise ValueError(f"results must have each policy once at each {swept}")
-    cells = {(result.policy, getattr(result, swept)): _cell(result, cost) for result in results}
-    policies = sorted(
-        {result.policy for result in results},
-        key=lambda policy: mean(
-            getattr(result, f"{cost}_mean") for result in results if result.policy == policy
-        ),
-    )
-    label, _ = COSTS[cost]
-    rows = [
-        [f"{swept.replace('_', ' ')}, {label}", *(_shown(swept, x) for x in xs)],
-        ["---"] * (len(xs) + 1),
-        *(
-            [_name(policy, results), *(cells.get((policy, x), "") for x in xs)]
-            for policy in policies
-        ),
+    if function := spec.get("function"):
+        module, _, name = function.partition(":")
+        return getattr(import_module(module), name)(folder)
+    columns = _listed(spec["columns"])
+    rows = [_row(each) for each in spec.get("rows", ())] or _by_age(spec, columns, folder)
+    used: Rows = []
+    cells = [[_cell(spec, row, column, folder, used) for column in columns] for row in rows]
+    lines = [
+        [spec.get("head", "policy"), *(column["head"] for column in columns)],
+        ["---"] * (len(columns) + 1),
+        *([_name(row, used), *its] for row, its in zip(rows, cells, strict=True)),
     ]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    if not used:
+        raise ValueError(f"the table of {', '.join(_sources(spec, {}, {}))} has no numbers")
+    shown = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return f"{shown}\n\n{origin(used)}"
 
 
-def _is_by_rate(results: Sequence[Result]) -> bool:
-    """Return whether the bit rate was swept."""
-    return len({result.bit_rate for result in results}) > 1
+def _listed(columns: list[dict[str, Any]] | dict[str, Any]) -> list[dict[str, Any]]:
+    """Return columns of a list, or those of one field's values."""
+    if isinstance(columns, list):
+        return columns
+    [(field, values)] = columns.items()
+    return [{"head": f"{x:g}" if isinstance(x, float) else str(x), field: x} for x in values]
 
 
-def _place(x: float | None) -> float:
-    """Return where a column stands; no limit comes last."""
-    return math.inf if x is None else x
+def _row(row: str | dict[str, Any]) -> dict[str, Any]:
+    return {"policy": row} if isinstance(row, str) else row
 
 
-def _shown(swept: str, x: float | None) -> str:
-    """Return a column's head."""
-    if x is None:
-        return "no limit"
-    return bits_per_second(x) if swept == "bit_rate" else f"{x:g}"
+def _sources(*parts: dict[str, Any]) -> list[str]:
+    """Return the names of the results that a cell is looked up in: those of the last that has."""
+    [*_, found] = [part["results"] for part in parts if "results" in part] or [()]
+    return [found] if isinstance(found, str) else list(found)
 
 
-def _name(policy: str, results: Sequence[Result]) -> str:
-    """Return a policy's name, and whether its packets carry more than the paper's."""
-    more = any(carries_more(result) for result in results if result.policy == policy)
-    return f"{policy} (packets {CARRIES_MORE})" if more else policy
+def _by_age(spec: dict[str, Any], columns: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
+    """Return a row for each policy found, the lowest mean over the columns first."""
+    where = spec.get("where", {})
+    found = [
+        row
+        for column in columns
+        for row in select(read(_sources(spec, column), folder), where | _keys(column))
+    ]
+    ages: dict[str, list[float]] = {}
+    for row in found:
+        ages.setdefault(row["policy"], []).append(row[spec.get("order", "aoi_mean")])
+    return [{"policy": name} for name in sorted(ages, key=lambda n: sum(ages[n]) / len(ages[n]))]
 
 
-def _cell(result: Result, cost: str) -> str:
-    """Return our value, and the published one in brackets if there is one."""
-    _, digits = COSTS[cost]
-    ours = _plus_minus(result, cost, digits)
-    published = _plus_minus(result, f"published_{cost}", digits)
-    return f"{ours} ({published})" if published else ours
+def _keys(part: dict[str, Any]) -> dict[str, Any]:
+    return {name: value for name, value in part.items() if name not in OWN}
 
 
-def _plus_minus(result: Result, name: str, digits: int) -> str:
-    value, sem = getattr(result, f"{name}_mean"), getattr(result, f"{name}_sem")
-    if value is None:
-        return ""
-    return f"{value:.{digits}f}" if sem is None else f"{value:.{digits}f} ± {sem:.{digits}f}"
+def _cell(
+    spec: dict[str, Any], row: dict[str, Any], column: dict[str, Any], folder: Path, used: Rows
+) -> str:
+    """Return a cell; note the result that it shows."""
+    if fact := column.get("fact"):
+        return row.get(fact) or _fact(row["policy"], fact)
+    where = spec.get("where", {}) | _keys(column) | _keys(row)
+    found = select(read(_sources(spec, column, row), folder), where)
+    if len(found) > 1:
+        raise ValueError(f"{len(found)} results have {where}; name what tells them apart")
+    used += found
+    form = row.get("form") or column.get("form") or spec.get("form", AGE)
+    beside = [PUBLISHED.format(*cost) for cost in COSTS if form.startswith(f"{{{cost[0]}_mean:")]
+    return "".join(shown(each, part) for each in found for part in (form, *beside))
 
 
-def _kind(result: Result, *, is_by_rate: bool) -> tuple[str, ...]:
-    """Return what distinguishes tables, in words."""
-    fate = (
-        [f"{result.failure_fraction:.0%} of the robots off half-way"]
-        if result.failure_fraction
-        else []
-    )
-    team = [f"{result.num_robots} robots"] if is_by_rate else []
-    return (result.task, f"preset {result.preset}", *team, *fate)
+def shown(row: Row, form: str) -> str:
+    """Return a result in a form, without what begins at a field that it does not have."""
+    text = ""
+    for part in re.split(r"(?= ± )", form):
+        try:
+            text += part.format(**row)
+        except (TypeError, KeyError):
+            break
+    return text
+
+
+def _fact(policy: str, fact: str) -> str:
+    """Return what a policy says of itself."""
+    mission = paper("random-walk")
+    said = facts_of(policy, make_policy(policy, mission), mission)[fact]
+    return {"none": "nothing"}.get(said, str(said))
+
+
+def _name(row: dict[str, Any], used: Rows) -> str:
+    if head := row.get("head"):
+        return head
+    its = [each for each in used if each["policy"] == row["policy"]]
+    more = any(each.get("payload") not in (None, "none") for each in its)
+    name = f"`{row['policy']}`" if row["policy"] in POLICIES else row["policy"]
+    return f"{name} (packets {CARRIES_MORE})" if more else name
+
+
+def value(words: str, folder: Path) -> str:
+    """Return a number of a sentence, given what its marker says; ValueError if it is not one."""
+    source, *keys, form = shlex.split(words)
+    where = dict(key.split("=", 1) for key in keys)
+    found = select(read([source], folder), where)
+    if len(found) != 1:
+        raise ValueError(f"{len(found)} results of {source} have {where}, not 1: {words}")
+    return shown(found[0], form)
+
+
+def filled(text: str, folder: Path) -> str:
+    """Return a page with its numbers as the results have them."""
+
+    def fill(match: re.Match[str]) -> str:
+        kind, what, before = match.groups()
+        if kind == "table":
+            if what not in TABLES:
+                raise ValueError(f"tables.toml has no table {what}")
+            now = f"\n\n{table(TABLES[what], folder)}\n\n"
+        else:
+            now = value(what, folder)
+        return f"<!-- {kind}: {what} -->{now}<!-- end -->" if now != before else match.group()
+
+    return MARKER.sub(fill, text)
+
+
+def numbers(pages: Iterable[Path], folder: Path) -> dict[Path, str]:
+    """Return the pages whose numbers differ from the results, as they should be."""
+    texts = {page: page.read_text("utf-8") for page in pages}
+    now = {page: _on_page(page, partial(filled, text, folder)) for page, text in texts.items()}
+    return {page: text for page, text in now.items() if text != texts[page]}
+
+
+def _on_page(page: Path, fill: Callable[[], str]) -> str:
+    try:
+        return fill()
+    except (ValueError, KeyError, OSError) as error:
+        raise ValueError(f"{page.name}: {error}") from error
 
 
 @dataclass(frozen=True, kw_only=True)
 class Options:
-    """The files that are shown."""
+    """Where the numbers come from, and whether they are written."""
 
-    files: tuple[Path, ...] = setting(
-        help="made by swarm-mj evaluate --csv", metavar="RESULTS.csv", is_positional=True
+    results: Path = setting(
+        ROOT / "training" / "results", "where they are", metavar="DIR", shown="training/results"
     )
+    check: bool = setting(False, "write nothing; fail if a page differs")
+    structure: bool = setting(False, "write nothing; fail if a table cannot be made")
 
 
 def run(options: Options) -> int:
-    """Print the tables; return the exit code."""
-    for path in options.files:
-        results = read_results(path)
-        kinds = [_kind(result, is_by_rate=_is_by_rate(results)) for result in results]
-        for kind in sorted(set(kinds)):
-            own = [result for result, its in zip(results, kinds, strict=True) if its == kind]
-            for cost in COSTS if own[0].task == "flocking" else ["aoi"]:
-                print(f"{', '.join(kind)}\n\n{table(own, cost)}\n")
-    return 0
+    """Write the pages, or check them; return the exit code."""
+    changed = numbers(PAGES, options.results)
+    if options.structure:
+        print(f"All {len(TABLES)} tables of the docs can be made from {options.results}")
+        return DONE
+    for page, text in changed.items():
+        print(f"{page.relative_to(ROOT)} {'differs' if options.check else 'is written'}")
+        if not options.check:
+            write_text(page, text)
+    return FAILED if options.check and changed else DONE
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -2,12 +2,14 @@
 
     python training/flocking_converges.py
 
-Flies the same missions with every policy and prints how much of the velocity variance is left at
-the end. Flocks without a boundary are the paper's, reflected ones the default flight's.
+Flies the same missions with every policy. Prints how much of the velocity variance is left at the
+end, and writes it to training/results/converging.csv. Flocks without a boundary are the paper's.
 """
 
 import sys
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 from rich.console import Console
@@ -21,8 +23,11 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.fields import setting
-from swarm_mj.system.packages import commit, version
+from swarm_mj.system.packages import commit
 from swarm_mj.system.terminal import WorkBar
+from swarm_mj.system.writing import Output, check_outputs, write_csv
+
+RESULTS = Path(__file__).resolve().parent / "results"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -32,6 +37,7 @@ class Settings:
     mission: Mission = paper("flocking")
     first_seed: int = setting(0, "of the first mission")
     num_missions: int = setting(100, "for each policy and boundary", low=1, high=10_000)
+    out: Path = setting(RESULTS / "converging.csv", "the table", metavar="FILE.csv")
     agreed_share: float = setting(
         AGREED, "a flock with less of its first variance left has agreed", low=0.0, high=1.0
     )
@@ -51,25 +57,55 @@ def left_over(settings: Settings, policy_name: str) -> np.ndarray:
     return summary.velocity_variance_last / summary.velocity_variance_first
 
 
+@dataclass(frozen=True, kw_only=True)
+class Row:
+    """How far the flocks of a boundary and a policy agree."""
+
+    boundary: str
+    policy: str
+    left_median: float  # of the first window's velocity variance, after the last window [1]
+    left_mean: float
+    left_worst: float
+    agreed_share: float  # of the flocks, with less than `Settings.agreed_share` left
+    episodes: int
+    seed: int  # of the first mission
+    commit: str | None
+
+
+def rows(open_area: Settings) -> Iterator[Row]:
+    """Fly every baseline without a boundary, then with one."""
+    walled = replace(open_area, mission=replace(open_area.mission, boundary="reflect"))
+    for settings in (open_area, walled):
+        for name in BASELINES:
+            share = left_over(settings, name)
+            yield Row(
+                boundary=settings.mission.boundary,
+                policy=name,
+                left_median=float(np.median(share)),
+                left_mean=float(np.mean(share)),
+                left_worst=float(np.max(share)),
+                agreed_share=float(np.mean(share < settings.agreed_share)),
+                episodes=settings.num_missions,
+                seed=settings.first_seed,
+                commit=commit(),
+            )
+
+
 def run(open_area: Settings) -> int:
     """Run the experiment; return its exit code."""
-    walled = replace(open_area, mission=replace(open_area.mission, boundary="reflect"))
+    check_outputs(Output("table", open_area.out, ".csv"))
+    found = list(rows(open_area))
     table = Table(title=f"Velocity variance left, {open_area.num_missions} missions")
     for heading in ("boundary", "policy"):
         table.add_column(heading)
     for heading in ("median", "mean", "worst", f"below {open_area.agreed_share:.0%}"):
         table.add_column(heading, justify="right")
-    for settings in (open_area, walled):
-        for name in BASELINES:
-            share = left_over(settings, name)
-            numbers = (np.median(share), np.mean(share), np.max(share))
-            agreed = np.mean(share < settings.agreed_share)
-            row = (*(f"{number:.1e}" for number in numbers), f"{agreed:.0%}")
-            table.add_row(settings.mission.boundary, name, *row)
-    console = Console(highlight=False)
-    console.print(table)
-    last = open_area.first_seed + open_area.num_missions - 1
-    console.print(f"Seeds {open_area.first_seed} to {last}, swarm_mj {version()}, {commit()}.")
+    for row in found:
+        left = (row.left_median, row.left_mean, row.left_worst)
+        shown = (*(f"{each:.1e}" for each in left), f"{row.agreed_share:.0%}")
+        table.add_row(row.boundary, row.policy, *shown)
+    Console(highlight=False).print(table)
+    write_csv(open_area.out, [spec.name for spec in fields(Row)], (asdict(row) for row in found))
     return 0
 
 

@@ -1,12 +1,13 @@
 """The paper's learned policies, trained and flown again, figure by figure (V).
 
-    python training/reproduce.py --scale quick
-    make reproduce SCALE=quick    # the same; then `make figures` draws what it left
+    python training/reproduce.py --force    # make reproduce: trains all anew, then flies them
+    python training/reproduce.py            # flies those that were trained: a part of make results
 
 What is trained and flown, and with which options, stands in `training/reproduce/`, one file a
-figure. `quick` has one to three hundredths of the authors' budget, `full` all of it.
-What `training/results/reproduce/SCALE` has of the same file is kept; `--force` makes it again. An
-interrupted run goes on where it broke off, as long as the commit is the same.
+figure; the policies that were trained stand beside it, by scale and figure. `quick` has one to
+three hundredths of the authors' budget, `full` all of it. Policies that are there are not trained
+again, and flights of this commit not flown again, unless `--force` says so. An interrupted run goes
+on where it broke off, as long as the commit is the same.
 """
 
 import hashlib
@@ -26,6 +27,7 @@ from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import parse, script
 from swarm_mj.evaluation.results import Result, read_results, write_results
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_run
+from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system import writing
 from swarm_mj.system.exit_codes import DONE
@@ -66,6 +68,13 @@ class Settings:
         metavar="DIR",
         shown="training/results/reproduce",
     )
+    policies: Path = setting(
+        ROOT / "training" / "reproduce",
+        "where trained policies go, in folders of the scale and the figure",
+        metavar="DIR",
+        shown="training/reproduce",
+    )
+    fly: str = setting("", "options of swarm-mj evaluate that override the file's")
     runs: Path = setting(
         ROOT / "runs" / "reproduce",
         "where runs are kept, to go on with",
@@ -100,24 +109,38 @@ class Work:
 
     @property
     def digest(self) -> str:
-        """A digest of everything in its file that counts at this scale."""
-        scale = {name: options for name, options in asdict(self.scale).items() if options}
-        said = (scale, self.experiment.trainings, self.experiment.flights)
+        """A digest of everything in its file that the trainings of this scale depend on."""
+        said = (self.scale.train, self.scale.own, self.experiment.trainings)
         return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:12]
 
     @property
     def tables(self) -> list[Path]:
         """The files it leaves: what flights cost, the trainings, and their curves."""
-        folder = self.settings.results / self.settings.scale
-        return [folder / f"{self.figure}{end}.csv" for end in ("", "-trainings", "-curves")]
+        flights = self.settings.results / self.settings.scale / f"{self.figure}.csv"
+        return [flights, self.kept / "trainings.csv", self.kept / "curves.csv"]
 
     @property
-    def is_finished(self) -> bool:
-        """True if the results of this very experiment are there."""
-        if not all(path.exists() for path in self.tables):
+    def kept(self) -> Path:
+        """The folder of what its trainings left."""
+        return self.settings.policies / self.settings.scale / self.figure
+
+    @property
+    def is_trained(self) -> bool:
+        """True if the policies of this very experiment are there, and the tables of them."""
+        paths = [*self.tables[1:], *map(self.policy, self.experiment.trainings)]
+        if not all(path.exists() for path in paths):
             return False
         rows = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
         return {row.get("experiment") for _, row in rows} == {self.digest}
+
+    @property
+    def is_flown(self) -> bool:
+        """True if the flights' results are there, of this commit."""
+        return _is_current(self.tables[0])
+
+    def policy(self, name: str) -> Path:
+        """Return where the policy of a training is kept."""
+        return self.kept / f"{name}{SUFFIX}"
 
     @cached_property
     def trainings(self) -> dict[str, list[str]]:
@@ -146,8 +169,8 @@ class Work:
             if name not in self.experiment.trainings:
                 known = ", ".join(self.experiment.trainings)
                 raise ValueError(f"{self.figure} flies {name!r}, but trains only {known}")
-        policies = [str(self.folder / name / POLICY) for name in flown]
-        options = typed(self.scale.fly, missions)
+        policies = [str(self.policy(name)) for name in flown]
+        options = typed(shlex.join(typed(self.scale.fly, missions)), self.settings.fly)
         jobs = ["--jobs", f"{self.settings.jobs}"]
         return ["evaluate", "--policy", *policies, *options, *jobs, "--csv", str(draft), "--resume"]
 
@@ -161,7 +184,7 @@ class Work:
         check_outputs(*(Output("results", path) for path in self.tables))
         for command in (*self.trainings.values(), *(each for _, each, _ in self.flights)):
             parse(command)
-        if self.folder.exists():
+        if self.folder.exists() and not self.is_trained:
             begun = self._begun()
             if begun != self._now() and not self.settings.force:
                 raise ValueError(
@@ -179,15 +202,20 @@ class Work:
         return read_json(read_file(self.folder / BEGUN, "beginning", MOST_BYTES), dict)
 
     def do(self) -> None:
-        """Train and fly what is missing, then write the tables; raise Failed if a command does."""
-        writing.write_json(self.folder / BEGUN, self._now())
-        for number, (name, command) in enumerate(self.trainings.items(), start=1):
-            _say(f"{self.figure}: training {number} of {len(self.trainings)}, {name}")
-            self._train(name, command)
+        """Train and fly what is missing, with its tables; raise Failed if a command does."""
+        if not self.is_trained:
+            writing.write_json(self.folder / BEGUN, self._now())
+            for number, (name, command) in enumerate(self.trainings.items(), start=1):
+                _say(f"{self.figure}: training {number} of {len(self.trainings)}, {name}")
+                self._train(name, command)
+            self._keep()
         for draft, command, _ in self.flights:
-            if not draft.exists():
+            if not _is_current(draft):
+                draft.unlink(missing_ok=True)
                 _run(command)
-        self._hand_over()
+        write_results(self.tables[0], list(self._results()))
+        for draft, _, _ in self.flights:
+            draft.unlink()
 
     def _train(self, name: str, command: list[str]) -> None:
         """Train one, or resume it; leave one alone that came to its end."""
@@ -196,9 +224,9 @@ class Work:
             _run([*command, "--resume"] if (run / SETTINGS).exists() else command)
             writing.write_text(ended, "")
 
-    def _hand_over(self) -> None:
-        """Write the tables, that of the flights last: it is drawn."""
-        results, trainings, curves = self.tables
+    def _keep(self) -> None:
+        """Keep the policies, and write the tables of trainings, which say whose they are, last."""
+        _, trainings, curves = self.tables
         rows = {name: _rows(self.folder / name / CURVE) for name in self.trainings}
         table = [{"training": name} | row for name, its in rows.items() for row in its]
         writing.write_csv(
@@ -206,8 +234,10 @@ class Work:
             CURVE_COLUMNS,
             ({name: row.get(name) for name in CURVE_COLUMNS} for row in table),
         )
+        for name in self.trainings:
+            trained = read_file(self.folder / name / POLICY, "policy", MOST_BYTES)
+            writing.write_bytes(self.policy(name), trained)
         writing.write_csv(trainings, TRAINING_COLUMNS, map(self._training, rows, rows.values()))
-        write_results(results, list(self._results(rows)))
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
         """Return a row of the table of trainings."""
@@ -218,32 +248,36 @@ class Work:
             "decisions": int(rows[-1]["decisions"]),
             "minutes": rows[-1]["minutes"],
             "best_decisions": config.training["decisions"],  # of the policy that was kept
-            "commit": commit(),
+            "commit": self._begun()["commit"],
             "experiment": self.digest,
             "settings": json.dumps(asdict(read_run(self.folder / name).training)),
         }
 
-    def _results(self, rows: dict[str, list[dict[str, Any]]]) -> Iterator[Result]:
+    def _results(self) -> Iterator[Result]:
         """Return the flights' results under their curves' names, with what was trained."""
+        trained = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
+        decisions = {row["training"]: int(row["decisions"]) for _, row in trained}
         for draft, _, curves in self.flights:
-            paths = {str(self.folder / name / POLICY): name for name in curves}
+            paths = {str(self.policy(name)): name for name in curves}
             for result in read_results(draft):
                 name = paths[result.policy]
-                trained = {"policy": name, "decisions": int(rows[name][-1]["decisions"])}
-                config = read_json(result.config, dict) | trained  # no folder of this machine
+                # The folder is this machine's.
+                own = {"policy": name, "decisions": decisions[name]}
+                config = json.dumps(read_json(result.config, dict) | own)
                 for curve in curves[name]:
-                    yield replace(
-                        result,
-                        policy=curve,
-                        baseline=paths[result.baseline],
-                        config=json.dumps(config),
-                    )
+                    baseline = paths[result.baseline]
+                    yield replace(result, policy=curve, baseline=baseline, config=config)
+
+
+def _is_current(path: Path) -> bool:
+    """Return whether a file has results of this commit."""
+    return path.exists() and {result.commit for result in read_results(path)} == {commit()}
 
 
 def run(settings: Settings) -> int:
     """Run the experiments; return the exit code."""
     works = [read_work(name, settings) for name in settings.figures]
-    left = [work for work in works if settings.force or not work.is_finished]
+    left = [w for w in works if settings.force or not (w.is_trained and w.is_flown)]
     for work in left:
         work.check()
     if settings.force:
@@ -268,7 +302,7 @@ def read_work(figure: str, settings: Settings) -> Work:
 
 def _remove(work: Work) -> None:
     """Remove a figure's results and runs."""
-    for path in work.tables:
+    for path in (*work.tables, *map(work.policy, work.experiment.trainings)):
         path.unlink(missing_ok=True)
     if work.folder.exists():
         shutil.rmtree(work.folder)

@@ -1,0 +1,165 @@
+"""Every table and figure of the README and the docs, flown from study files at one commit (V).
+
+    python training/results.py                  # make results: two to three hours on two cores
+    python training/results.py --scale smoke    # the same structure, a few windows each: minutes
+    python training/results.py --studies paper-random-walk channels
+
+Each file of `training/studies/` is a study, flown as `swarm-mj study run` does; beside them fly the
+trained policies of `reproduce.py`, and the experiments that no study can describe. Each leaves a
+table of its name in `training/results/`: `NAME.csv` has a row for each policy and regime,
+`NAME.parquet` one for each mission. What is there of this commit is kept; `--force` flies it again.
+An interrupted run continues where it broke off. Then `tools/results_table.py` writes the numbers
+into the docs, and `make figures` draws them.
+"""
+
+import csv
+import io
+import os
+import sys
+from collections.abc import Callable, Sequence
+from contextlib import chdir, redirect_stdout
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import bounds
+import flocking_converges
+import reproduce
+
+from swarm_mj.cli import script
+from swarm_mj.cli.evaluate import StudyFlags, fly
+from swarm_mj.cli.study import read_study
+from swarm_mj.evaluation.study import Study
+from swarm_mj.system.exit_codes import DONE
+from swarm_mj.system.fields import setting
+from swarm_mj.system.packages import commit
+from swarm_mj.system.reading import read_file
+from swarm_mj.system.writing import Output, check_outputs, write_bytes
+
+ROOT = Path(__file__).resolve().parent.parent
+SCALES = ("paper", "smoke")
+MISSIONS, WINDOWS = 2, 12  # of smoke, each study's
+STUDIES = tuple(sorted(path.stem for path in (ROOT / "training" / "studies").glob("*.toml")))
+KINDS = (".csv", ".parquet")
+MAX_BYTES = 100_000_000
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """What is flown, and where it goes."""
+
+    scale: str = setting("paper", "how much is flown", choices=SCALES)
+    studies: tuple[str, ...] = setting(
+        (*STUDIES, "floor", "converging", "gnn"),
+        "which tables",
+        choices=(*STUDIES, "floor", "converging", "gnn"),
+        shown="all",
+    )
+    results: Path | None = setting(
+        None,
+        "where tables go",
+        metavar="DIR",
+        shown="training/results, or runs/smoke",
+    )
+    jobs: int = setting(os.cpu_count() or 1, "missions at once", low=1, high=256)
+    force: bool = setting(False, "fly everything again")
+
+    @property
+    def is_smoke(self) -> bool:
+        """Whether only the structure is tried."""
+        return self.scale == "smoke"
+
+    @property
+    def folder(self) -> Path:
+        """Where tables go."""
+        usual = ROOT / "runs" / "smoke" if self.is_smoke else ROOT / "training" / "results"
+        return (self.results or usual).resolve()
+
+
+def smoked(study: Study) -> Study:
+    """Return a study of the same policies and regimes, with few short missions."""
+    regimes = tuple(replace(regime, num_windows=WINDOWS) for regime in study.regimes)
+    return replace(study, episodes=MISSIONS, regimes=tuple(dict.fromkeys(regimes)))
+
+
+def fly_study(settings: Settings, name: str) -> int:
+    """Fly a study, or the rest of it; return the exit code."""
+    study = read_study(str(ROOT / "training" / "studies" / f"{name}.toml"))
+    study = smoked(study) if settings.is_smoke else study
+    drafts = [ROOT / "runs" / "results" / settings.scale / f"{name}{kind}" for kind in KINDS]
+    targets = [settings.folder / draft.name for draft in drafts]
+    say(f"{name}: {study.num_missions:,} missions")
+    how = {"jobs": settings.jobs, "resume": not settings.force, "force": settings.force}
+    with redirect_stdout(io.StringIO()):  # the tables are printed nowhere: they are in the docs
+        code = fly(StudyFlags(csv=drafts[0], parquet=drafts[1], **how), study)
+    for draft, target in zip(drafts, targets, strict=True):
+        if code == DONE:
+            write_bytes(target, read_file(draft, "draft", MAX_BYTES))
+            draft.unlink()
+    return code
+
+
+def fly_floor(settings: Settings) -> int:
+    """Compute the floor of `docs/bounds.md`; return the exit code."""
+    usual = bounds.Settings(out=settings.folder / "floor.csv")
+    return bounds.run(replace(usual, teams=1, seconds=0.1) if settings.is_smoke else usual)
+
+
+def fly_converging(settings: Settings) -> int:
+    """Fly flocks until they agree; return the exit code."""
+    usual = flocking_converges.Settings(out=settings.folder / "converging.csv")
+    return flocking_converges.run(
+        replace(usual, num_missions=MISSIONS) if settings.is_smoke else usual
+    )
+
+
+def fly_gnn(settings: Settings) -> int:
+    """Fly the policies that `reproduce.py` trained; return the exit code."""
+    usual = reproduce.Settings(jobs=settings.jobs)
+    if not settings.is_smoke:
+        return reproduce.run(usual)
+    few = f"--episodes {MISSIONS} --windows {WINDOWS}"
+    return reproduce.run(replace(usual, fly=few, results=settings.folder / "reproduce"))
+
+
+OTHERS: dict[str, Callable[[Settings], int]] = {
+    "floor": fly_floor,
+    "converging": fly_converging,
+    "gnn": fly_gnn,
+}
+
+
+def is_current(path: Path) -> bool:
+    """Return whether a table is there, of this commit alone."""
+    if not path.exists():
+        return False
+    rows = csv.DictReader(read_file(path, "table", MAX_BYTES).decode().splitlines())
+    return {row["commit"] for row in rows} == {commit()}
+
+
+def run(settings: Settings) -> int:
+    """Fly what is missing; return the exit code."""
+    check_outputs(*(Output("results", settings.folder / f"{each}.csv") for each in STUDIES))
+    for number, name in enumerate(settings.studies, start=1):
+        if not settings.force and is_current(settings.folder / f"{name}.csv"):
+            say(f"{name}: {settings.folder / name}.csv is there; --force flies it again")
+            continue
+        say(f"Table {number} of {len(settings.studies)}")
+        with chdir(ROOT):
+            code = OTHERS[name](settings) if name in OTHERS else fly_study(settings, name)
+        if code != DONE:
+            return code
+    return DONE
+
+
+def say(line: str) -> None:
+    """Print a line of progress."""
+    sys.stderr.write(f"{line}\n")
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run the experiment; return its exit code."""
+    return script(Settings, run, arguments)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
