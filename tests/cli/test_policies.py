@@ -9,7 +9,6 @@ import pytest
 from tiny_policies import save_tiny
 
 from swarm_mj.cli import main
-from swarm_mj.cli.policies import facts_of
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.tuning import tuned_probability
@@ -97,23 +96,9 @@ def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
     assert "nobody" in capsys.readouterr().err
 
 
-@pytest.mark.parametrize("page", ["README.md", "docs/policies.md"])
-def test_pages_say_what_packets_carry(page):
-    rows = list(table_rows(page))
-    for row in rows:
+def test_the_readme_says_what_packets_carry():
+    for row in table_rows("README.md"):
         carried = next(cell for head, cell in row.items() if head.startswith("packets carry"))
         has_payload = make_policy(row["policy"], MISSION).payload != "none"
         assert ("snapshots" in carried) == has_payload, row
         assert (carried == "nothing") != has_payload, row
-
-
-def test_the_page_of_policies_has_all_of_them_and_their_own_words():
-    rows = {row["policy"]: row for row in table_rows("docs/policies.md")}
-    assert set(rows) == set(POLICIES)
-    for name, row in rows.items():
-        mission = paper("stationary") if name == "planner --payload none" else MISSION
-        facts = facts_of(name, make_policy(name, mission), mission)
-        told = row["what each robot uses"]
-        assert told.removeprefix("*centralised:* ") == facts["uses"], name
-        assert told.startswith("*centralised:*") == facts["is_centralised"]
-        assert row["window"].startswith("two") == (facts["window"] == "broadcasts")
