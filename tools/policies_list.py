@@ -10,7 +10,8 @@ from swarm_mj.policies.registry import POLICIES, WITHOUT_PAYLOAD, make_policy
 
 HEADS = ("policy", "window", "what each robot uses", "packets carry beyond T, M, P", "bytes")
 WINDOWS = {"broadcasts": "two broadcasts", "request": "request, response"}
-NAMES = re.compile(rf"(?<![\w-])({'|'.join(sorted(POLICIES, key=len, reverse=True))})(?![\w-])")
+_NAMES = "|".join(sorted(POLICIES, key=len, reverse=True))
+CODE = re.compile(rf"(?<![\w-])({_NAMES}|--preset \w+)(?![\w-])")
 NUM_ROBOTS = 40
 
 
@@ -44,7 +45,7 @@ def _row(name: str, task: Task, when: str) -> tuple[str, ...]:
 
 
 def _used(facts: dict[str, Any]) -> str:
-    text = NAMES.sub(r"`\1`", facts["uses"])
+    text = CODE.sub(r"`\1`", facts["uses"])
     return f"*centralised:* {text}" if facts["is_centralised"] else text
 
 

@@ -47,9 +47,10 @@ def test_a_row_says_what_the_command_says(rows, row, name, task, capsys):
     assert num_bytes == f"{said['packet_bytes']:,}"
 
 
-def test_names_of_policies_are_code_and_parts_of_other_names_are_not(rows):
+def test_names_are_code_and_parts_of_other_names_are_not(rows):
     assert rows["`spatial-tdma`"][1].startswith("as `tdma`, ")
     assert "moving teams fly `spatial-tdma`" in rows["`planner --payload none`"][1]
+    assert "(moving teams of `--preset reference`: " in rows["`mst`"][1]
 
 
 def test_the_docs_have_the_list():
