@@ -141,7 +141,8 @@ def _fact(policy: str, fact: str) -> str:
     """Return what a policy says of itself."""
     mission = paper("random-walk")
     said = facts_of(policy, make_policy(policy, mission), mission)[fact]
-    return {"none": "nothing"}.get(said, str(said))
+    text = ", ".join(said) if isinstance(said, list | tuple) else str(said)
+    return "nothing" if text in ("none", "") else text
 
 
 def _name(row: dict[str, Any], used: Rows) -> str:
