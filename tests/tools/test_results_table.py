@@ -140,15 +140,18 @@ def test_names_say_what_packets_carry_and_what_is_no_policy(made):
 def test_facts_are_what_a_policy_says_of_itself_or_what_the_row_says(made):
     spec = {
         "results": "some",
-        "columns": [{"head": "carries", "fact": "payload"}, {"head": "age", "form": "{aoi_mean}"}],
-        "rows": ["planner", "tdma", {"policy": "mine.py:Mine", "payload": "nothing"}],
+        "columns": [
+            {"head": "carries", "fact": "payload"},
+            {"head": "uses", "fact": "beyond_paper"},
+            {"head": "age", "form": "{aoi_mean}"},
+        ],
+        "rows": ["planner", "mst", {"policy": "mine.py:Mine", "payload": "-", "beyond_paper": "-"}],
     }
-    rows = [result("tdma", aoi_mean=2.5)]
-    assert cells(table(spec, made(rows))) == [
-        "| `planner` | snapshots |  |",
-        "| `tdma` | nothing | 2.5 |",
-        "| mine.py:Mine | nothing |  |",
-    ]
+    uses = [line.split(" | ") for line in cells(table(spec, made([result("mst", aoi_mean=2.5)])))]
+    assert [line[1] for line in uses] == ["snapshots", "nothing", "-"]
+    assert uses[0][2].startswith("common order, clock, team size, ")
+    assert [line[2] for line in uses[1:]] == ["nothing", "-"]
+    assert [line[3] for line in uses] == [" |", "2.5 |", " |"]
 
 
 def test_a_function_makes_its_table_and_named_results_their_origin(made, tmp_path, monkeypatch):
