@@ -16,9 +16,9 @@ def walks(policy, ages):
 def folder(tmp_path):
     """Ages that grow with the root of the size, from 10 windows or 2 at 100 robots."""
     small = {10: (1.04, 0.06), 100: (10.0, 0.5)}
-    rows = [*walks("tdma", small), *walks("planner", {10: (2.0, 0.25), 100: (2.0, 0.1)})]
+    rows = [*walks("csma", small), *walks("tdma", {10: (2.0, 0.25), 100: (2.0, 0.1)})]
     write_results(tmp_path / "large-teams-small.csv", rows)
-    write_results(tmp_path / "large-teams.csv", walks("tdma", {200: (20.0, 1.0), 800: (40.0, 2.0)}))
+    write_results(tmp_path / "large-teams.csv", walks("csma", {200: (20.0, 1.0), 800: (40.0, 2.0)}))
     return tmp_path
 
 
@@ -26,8 +26,8 @@ def test_the_table_has_ages_of_both_files_and_exponents_the_least_age_first(fold
     assert program.table(folder).splitlines() == [
         "| policy | 10 robots | 100 | 200 | 800 | exponent |",
         "| --- | --- | --- | --- | --- | --- |",
-        "| `planner` | 2.0 ± 0.2 | 2.0 ± 0.1 |  |  |  |",
-        "| `tdma` | 1.0 ± 0.1 | 10.0 ± 0.5 | 20.0 ± 1.0 | 40.0 ± 2.0 | 0.50 |",
+        "| `tdma` | 2.0 ± 0.2 | 2.0 ± 0.1 |  |  |  |",
+        "| `csma` | 1.0 ± 0.1 | 10.0 ± 0.5 | 20.0 ± 1.0 | 40.0 ± 2.0 | 0.50 |",
     ]
 
 
@@ -40,7 +40,7 @@ def test_the_exponent_is_that_of_large_teams():
 def test_the_chart_has_a_curve_for_each_policy_over_the_sizes_of_both_files(folder):
     found = program.read(folder)
     drawn = {curve.method: curve.x.tolist() for curve in program.own_curves(found)}
-    assert drawn == {"tdma": [10.0, 100.0, 200.0, 800.0], "planner": [10.0, 100.0]}
+    assert drawn == {"csma": [10.0, 100.0, 200.0, 800.0], "tdma": [10.0, 100.0]}
     (axes,) = program.draw(found).axes
     assert axes.get_xscale() == "log"
     assert len(read_results(folder / "large-teams.csv")) == 2
