@@ -3,6 +3,8 @@
 It is made from `swarm_mj/policies/uses.toml`, where `swarm-mj policies NAME` has it from, too.
 """
 
+from pathlib import Path
+
 from swarm_mj.policies.registry import BEYOND, KINDS
 
 POSITIONS = "positions"  # the one column of both kinds of positions
@@ -15,8 +17,11 @@ ROWS = {
 }
 
 
-def table() -> str:
-    """Return the table, policies by kinds, and below it a list of the kinds in a sentence each."""
+def table(_folder: Path | None = None) -> str:
+    """Return the table, policies by kinds, and below it a list of the kinds in a sentence each.
+
+    No result is in it, whatever the folder of the results.
+    """
     columns = list(dict.fromkeys(POSITIONS if kind in MARKS else kind for kind in KINDS))
     rows = [["policy", *columns], ["---"] * (len(columns) + 1)]
     for policy, kinds in BEYOND.items():

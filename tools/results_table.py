@@ -33,6 +33,7 @@ from swarm_mj.system.writing import write_text
 ROOT = Path(__file__).resolve().parent.parent
 PAGES = (ROOT / "README.md", *sorted((ROOT / "docs").rglob("*.md")))
 TABLES: dict[str, Any] = tomllib.loads(Path(__file__).with_name("tables.toml").read_text("utf-8"))
+NAMES: dict[str, str] = TABLES.pop("names")  # of policies, where a table does not show the policy's
 MARKER = re.compile(r"<!-- (table|value): (.*?) -->(.*?)<!-- end -->", re.DOTALL)
 AGE = "{aoi_mean:.1f} ± {aoi_sem:.1f}"
 PUBLISHED = (
@@ -40,6 +41,7 @@ PUBLISHED = (
 )
 COSTS = (("aoi", ".1f"), ("velocity_variance", ".3f"))  # that the paper published, and their digits
 OWN = ("head", "results", "form", "fact")  # keys of a row or a column that no result has
+sys.path.append(str(ROOT / "training"))  # where the modules are that make tables
 
 
 def table(spec: dict[str, Any], folder: Path) -> str:
@@ -48,10 +50,10 @@ def table(spec: dict[str, Any], folder: Path) -> str:
     Raises ValueError if a cell could be one of several results, or there is nothing to show.
     """
     if function := spec.get("function"):
-        module, _, name = function.partition(":")
-        return getattr(import_module(module), name)(folder)
+        return _made(function, _sources(spec), folder)
     columns = _listed(spec["columns"])
     rows = [_row(each) for each in spec.get("rows", ())] or _by_age(spec, columns, folder)
+    rows += spec.get("more", ())
     used: Rows = []
     cells = [[_cell(spec, row, column, folder, used) for column in columns] for row in rows]
     lines = [
@@ -63,6 +65,13 @@ def table(spec: dict[str, Any], folder: Path) -> str:
         raise ValueError(f"the table of {', '.join(_sources(spec, {}, {}))} has no numbers")
     shown = "\n".join(f"| {' | '.join(line)} |" for line in lines)
     return f"{shown}\n\n{origin(used)}"
+
+
+def _made(function: str, sources: Sequence[str], folder: Path) -> str:
+    """Return the table of a function, with the origin of the results that it shows."""
+    module, _, name = function.partition(":")
+    made = getattr(import_module(module), name)(folder)
+    return f"{made}\n\n{origin(read(sources, folder))}" if sources else made
 
 
 def _listed(columns: list[dict[str, Any]] | dict[str, Any]) -> list[dict[str, Any]]:
@@ -132,7 +141,8 @@ def _fact(policy: str, fact: str) -> str:
     """Return what a policy says of itself."""
     mission = paper("random-walk")
     said = facts_of(policy, make_policy(policy, mission), mission)[fact]
-    return {"none": "nothing"}.get(said, str(said))
+    text = ", ".join(said) if isinstance(said, list | tuple) else str(said)
+    return "nothing" if text in ("none", "") else text
 
 
 def _name(row: dict[str, Any], used: Rows) -> str:
@@ -140,7 +150,8 @@ def _name(row: dict[str, Any], used: Rows) -> str:
         return head
     its = [each for each in used if each["policy"] == row["policy"]]
     more = any(each.get("payload") not in (None, "none") for each in its)
-    name = f"`{row['policy']}`" if row["policy"] in POLICIES else row["policy"]
+    policy = str(row["policy"])
+    name = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else NAMES.get(policy, policy)
     return f"{name} (packets {CARRIES_MORE})" if more else name
 
 
@@ -151,7 +162,9 @@ def value(words: str, folder: Path) -> str:
     found = select(read([source], folder), where)
     if len(found) != 1:
         raise ValueError(f"{len(found)} results of {source} have {where}, not 1: {words}")
-    return shown(found[0], form)
+    if not (number := shown(found[0], form)):
+        raise ValueError(f"{source} has no such number: {words}")
+    return number
 
 
 def filled(text: str, folder: Path) -> str:
@@ -173,15 +186,16 @@ def filled(text: str, folder: Path) -> str:
 def numbers(pages: Iterable[Path], folder: Path) -> dict[Path, str]:
     """Return the pages whose numbers differ from the results, as they should be."""
     texts = {page: page.read_text("utf-8") for page in pages}
-    now = {page: _on_page(page, partial(filled, text, folder)) for page, text in texts.items()}
+    now = {page: _named(page.name, partial(filled, text, folder)) for page, text in texts.items()}
     return {page: text for page, text in now.items() if text != texts[page]}
 
 
-def _on_page(page: Path, fill: Callable[[], str]) -> str:
+def _named(name: str, make: Callable[[], str]) -> str:
+    """Return what is made; an error names the page or the table."""
     try:
-        return fill()
-    except (ValueError, KeyError, OSError) as error:
-        raise ValueError(f"{page.name}: {error}") from error
+        return make()
+    except (ValueError, KeyError, OSError, ImportError, AttributeError) as error:
+        raise ValueError(f"{name}: {error}") from error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -192,13 +206,15 @@ class Options:
         ROOT / "training" / "results", "where they are", metavar="DIR", shown="training/results"
     )
     check: bool = setting(False, "write nothing; fail if a page differs")
-    structure: bool = setting(False, "write nothing; fail if a table cannot be made")
+    structure: bool = setting(False, "write nothing; fail if a table or number cannot be made")
 
 
 def run(options: Options) -> int:
     """Write the pages, or check them; return the exit code."""
     changed = numbers(PAGES, options.results)
     if options.structure:
+        for name, spec in TABLES.items():
+            _named(name, partial(table, spec, options.results))
         print(f"All {len(TABLES)} tables of the docs can be made from {options.results}")
         return DONE
     for page, text in changed.items():

@@ -1,11 +1,11 @@
 """What each impairment costs each policy: one table, and one chart.
 
-    swarm-mj study run impairments-small --csv training/results/impairments.csv
+    make results STUDIES=impairments
     python training/impairments_figure.py
 
-Writes assets/figures/impairments.png, and prints the table of docs/results.md. Numbers are
-ages over those of the same policy, task and seeds without impairments. Missions among obstacles are
-compared to the same ones with a correct map.
+Writes assets/figures/impairments.png. Numbers are ages over those of the same policy, task and
+seeds without impairments. Missions among obstacles are compared to the same ones with a correct
+map.
 """
 
 import math
@@ -23,10 +23,10 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import code, look_of, save, styled, write_caption
 from swarm_mj.evaluation.results import Result, config_of, read_results
 from swarm_mj.system.fields import setting
-from swarm_mj.system.terminal import plain_console
 
 ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "training" / "results" / "impairments.csv"
+RESULTS = ROOT / "training" / "results"
+FILE = "impairments.csv"
 TASKS = ("stationary", "random-walk", "flocking")
 NONE = "none"
 # Names of the missions by the fields in which they differ from those without impairments.
@@ -56,10 +56,8 @@ class ImpairmentsFigure:
     )
 
     def __call__(self) -> int:
-        """Draw the figure and print the table; return the exit code."""
-        found = read_results(RESULTS)
-        plain_console().print(table(found))
-        save(draw(found), self.out)
+        """Draw the figure; return the exit code."""
+        save(draw(read_results(RESULTS / FILE)), self.out)
         return 0
 
 
@@ -110,6 +108,11 @@ def table(found: Sequence[Result]) -> str:
         shown = (f"{age:.1f}" for age in usual)
         rows.append([f"`{policy}`", *shown, *(f"{each:.2f}" for each in factors)])
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+
+
+def docs_table(folder: Path) -> str:
+    """Return the table of the results in a folder."""
+    return table(read_results(folder / FILE))
 
 
 def draw(found: Sequence[Result]) -> Figure:

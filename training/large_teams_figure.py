@@ -1,14 +1,10 @@
 """A chart of the age of walking teams by their size, from 10 to 1000 robots.
 
-    swarm-mj evaluate --task random-walk --robots 10 20 40 80 --seed 3000 --episodes 8 \
-      --policy planner age-gain-csma sotdma gnn spatial-tdma gossip csma tdma random-flooding \
-      --csv small.csv
-    swarm-mj evaluate --task random-walk --robots 200 400 1000 --seed 3000 --episodes 8 \
-      --policy age-gain-csma spatial-tdma gossip csma tdma random-flooding --csv large.csv
+    make results STUDIES="large-teams large-teams-small"
     python training/large_teams_figure.py
 
-training/results/large-random-walk.csv holds the rows of both. Writes assets/figures/large-teams.svg
-and .png, and prints the exponents of age over size from 200 robots on.
+Writes assets/figures/large-teams.svg and .png from `large-teams-small.csv` (10 to 80 robots) and
+`large-teams.csv` (200 to 1000). `table` has the same numbers, and the exponents of age over size.
 """
 
 import sys
@@ -17,6 +13,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Float
 from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
@@ -26,9 +23,9 @@ from swarm_mj.evaluation.figures.style import FAINT, save
 from swarm_mj.evaluation.published import TEAM_SIZE
 from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.system.fields import setting
-from swarm_mj.system.terminal import plain_console
 
 ROOT = Path(__file__).resolve().parent.parent
+FILES = ("large-teams-small.csv", "large-teams.csv")
 FIGURE = replace(TEAM_SIZE, title="From 10 to 1000 robots", x_scale="log")
 LARGE = 200  # robots, from which the exponents are fitted
 AT_10 = 4.0  # windows of age: where the line of the diameter begins
@@ -45,14 +42,33 @@ class LargeTeamsFigure:
     )
 
     def __call__(self) -> int:
-        """Draw the figure and print exponents; return the exit code."""
-        found = read_results(ROOT / "training" / "results" / "large-random-walk.csv")
-        for curve in own_curves(found):
-            if curve.x[-1] > LARGE:
-                plain_console().print(f"{curve.method}: N^{exponent(curve):.2f}")
+        """Draw the figure; return the exit code."""
+        found = read(ROOT / "training" / "results")
         for kind in ("svg", "png"):
             save(draw(found), self.out.with_name(f"{self.out.name}.{kind}"))
         return 0
+
+
+def read(folder: Path) -> list[Result]:
+    """Return the results of teams of all sizes."""
+    return [result for name in FILES for result in read_results(folder / name)]
+
+
+def table(folder: Path) -> str:
+    """Return Markdown: ages by size, and exponents; the lowest at the largest shared size first."""
+    found = {(r.policy, r.num_robots): r for r in read(folder)}
+    policies = list(dict.fromkeys(policy for policy, _ in found))
+    sizes = sorted({size for _, size in found})
+    shared = max(n for n in sizes if all((policy, n) in found for policy in policies))
+    rows = [["policy", f"{sizes[0]} robots", *map(str, sizes[1:]), "exponent"]]
+    rows.append(["---"] * len(rows[0]))
+    for policy in sorted(policies, key=lambda policy: found[policy, shared].aoi_mean):
+        its = {n: found[policy, n] for n in sizes if (policy, n) in found}
+        ages = np.array([each.aoi_mean for each in its.values()])
+        power = f"{exponent(np.array([*its], float), ages):.2f}" if max(its) > LARGE else ""
+        cells = (f"{its[n].aoi_mean:.1f} ± {its[n].aoi_sem:.1f}" if n in its else "" for n in sizes)
+        rows.append([f"`{policy}`", *cells, power])
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
 def own_curves(found: Sequence[Result]) -> list[Curve]:
@@ -61,10 +77,10 @@ def own_curves(found: Sequence[Result]) -> list[Curve]:
     return [curve for curve in every if not curve.is_published]
 
 
-def exponent(curve: Curve) -> float:
+def exponent(sizes: Float[np.ndarray, "X"], ages: Float[np.ndarray, "X"]) -> float:
     """Return p of c N^p, the least squares in logarithms over large teams."""
-    is_large = curve.x >= LARGE
-    return float(np.polyfit(np.log(curve.x[is_large]), np.log(curve.mean[is_large]), 1)[0])
+    is_large = sizes >= LARGE
+    return float(np.polyfit(np.log(sizes[is_large]), np.log(ages[is_large]), 1)[0])
 
 
 def draw(found: Sequence[Result]) -> Figure:

@@ -44,7 +44,7 @@ def kinds_by_row(table):
 
 def test_the_page_has_the_table(table):
     (shown,) = re.findall(
-        r"^<!-- table: beyond-paper -->\n(.*?)\n<!-- end -->$", PAGE.read_text(), re.M | re.S
+        r"^<!-- table: beyond-paper -->\n\n(.*?)\n\n<!-- end -->$", PAGE.read_text(), re.M | re.S
     )
     assert shown == table
 

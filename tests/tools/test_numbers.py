@@ -1,0 +1,59 @@
+"""The numbers of the README and the docs are those of the results, all of one commit."""
+
+import csv
+import re
+from pathlib import Path
+
+import pytest
+from results_table import MARKER, PAGES, numbers
+
+ROOT = Path(__file__).parents[2]
+RESULTS = ROOT / "training" / "results"
+CODE = re.compile(r"^( *)```.*?^\1```$", re.MULTILINE | re.DOTALL)
+BY_HAND = re.compile(r"±|\bcommit `?[0-9a-f]{7,}")
+# These show no result: they chose the weights that are shipped, and constants of a policy.
+HISTORY = {RESULTS / "learning", RESULTS / "classics-tuning.csv"}
+may_fail = pytest.mark.xfail(reason="the results of 1.0 are being flown", strict=False)
+
+
+@may_fail
+def test_the_pages_have_the_numbers_of_the_results():
+    assert not [page.name for page in numbers(PAGES, RESULTS)]
+
+
+def by_hand(text):
+    """The errors and commits that no tool has written."""
+    return BY_HAND.findall(MARKER.sub("", CODE.sub("", text)))
+
+
+@pytest.mark.parametrize("page", PAGES, ids=lambda page: str(page.relative_to(ROOT)))
+def test_no_page_has_results_that_were_typed(page):
+    assert not by_hand(page.read_text(encoding="utf-8"))
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ("12.0 ± 0.5 windows", ["±"]),
+        ("at commit e15dd29, and commit `e15dd29`", ["commit e15dd29", "commit `e15dd29"]),
+        ("commit early\n", []),
+        ("<!-- table: x -->\n\n| 1 ± 2 |\n\n*commit e15dd29*\n\n<!-- end -->\n", []),
+        ("of <!-- value: x {a} -->1 ± 2<!-- end --> windows, 3 ± 4", ["±"]),
+        ("```\n1 ± 2\n```\ntext\n  ```sh\n3 ± 4\n  ```\n", []),
+        ("```\n1\n```\n2 ± 3\n```\n4\n```\n", ["±"]),
+    ],
+)
+def test_errors_and_commits_count_outside_markers_and_code_only(text, found):
+    assert by_hand(text) == found
+
+
+@may_fail
+def test_all_results_are_of_one_clean_commit():
+    commits = {}
+    for path in sorted(RESULTS.rglob("*.csv")):
+        if not HISTORY & {path, *path.parents}:
+            with path.open(newline="", encoding="utf-8") as file:
+                for row in csv.DictReader(file):
+                    commits.setdefault(row["commit"], set()).add(path.name)
+    assert len(commits) == 1, commits
+    assert re.fullmatch("[0-9a-f]{12}", *commits)
