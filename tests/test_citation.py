@@ -19,6 +19,14 @@ def test_the_citation_is_of_this_package(field):
     assert CITATION["title"].startswith(PROJECT["name"])
 
 
+def test_readers_see_this_version_in_the_bibtex_and_the_wheel_s_name():
+    assert f"version = {{{PROJECT['version']}}}" in (ROOT / "README.md").read_text()
+    year = CITATION["date-released"][:4]
+    assert f"year    = {{{year}}}" in (ROOT / "README.md").read_text()
+    wheels = re.findall(r"swarm_mj-(\S+)-py3-none-any\.whl", (ROOT / "docs/python.md").read_text())
+    assert wheels == [PROJECT["version"]]
+
+
 def test_the_paper_is_cited_alike_everywhere():
     paper = CITATION["preferred-citation"]
     assert paper["url"] == PROJECT["urls"]["Paper"]

@@ -33,8 +33,8 @@ def _row(name: str, cells: dict[str, str]) -> Row:
     """Return a row's numbers and words, with all that its mission and policy depend on."""
     config = json.loads(cells.get("config") or "{}")
     own = {field: _number(cell) for field, cell in cells.items() if field != "config"}
-    if bytes_per_second := own.get("bytes_per_second"):
-        own["kilobytes_per_second"] = bytes_per_second / 1e3
+    if isinstance(sent := own.get("bytes_per_second"), float):
+        own["kilobytes_per_second"] = sent / 1e3
     return config | own | {"results": name, "is_published": False}
 
 

@@ -38,7 +38,9 @@ from swarm_mj.system.writing import Output, check_outputs, write_bytes
 ROOT = Path(__file__).resolve().parent.parent
 SCALES = ("paper", "smoke")
 MISSIONS, WINDOWS = 2, 12  # of smoke, each study's
-STUDIES = tuple(sorted(path.stem for path in (ROOT / "training" / "studies").glob("*.toml")))
+FOLDER = ROOT / "training" / "studies"
+SHIPPED = {"impairments": "impairments-small"}  # with the package, under other names
+STUDIES = tuple(sorted([*SHIPPED, *(path.stem for path in FOLDER.glob("*.toml"))]))
 KINDS = (".csv", ".parquet")
 MAX_BYTES = 100_000_000
 
@@ -74,6 +76,16 @@ class Settings:
         usual = ROOT / "runs" / "smoke" if self.is_smoke else ROOT / "training" / "results"
         return (self.results or usual).resolve()
 
+    @property
+    def drafts(self) -> Path:
+        """Where tables wait until all of their missions have flown."""
+        return self.results / "drafts" if self.results else ROOT / "runs" / "results" / self.scale
+
+
+def study_of(name: str) -> Study:
+    """Return a study by the name of its table."""
+    return read_study(SHIPPED.get(name, str(FOLDER / f"{name}.toml")))
+
 
 def smoked(study: Study) -> Study:
     """Return a study of the same policies and regimes, with few short missions."""
@@ -83,9 +95,9 @@ def smoked(study: Study) -> Study:
 
 def fly_study(settings: Settings, name: str) -> int:
     """Fly a study, or the rest of it; return the exit code."""
-    study = read_study(str(ROOT / "training" / "studies" / f"{name}.toml"))
+    study = study_of(name)
     study = smoked(study) if settings.is_smoke else study
-    drafts = [ROOT / "runs" / "results" / settings.scale / f"{name}{kind}" for kind in KINDS]
+    drafts = [settings.drafts.resolve() / f"{name}{kind}" for kind in KINDS]
     targets = [settings.folder / draft.name for draft in drafts]
     say(f"{name}: {study.num_missions:,} missions")
     how = {"jobs": settings.jobs, "resume": not settings.force, "force": settings.force}

@@ -47,19 +47,19 @@ class StabilityFigure:
         "the files, without their endings",
         shown="assets/figures/stability",
     )
-    results: Path = setting(
-        ROOT / "training" / "results" / "reproduce" / "quick",
+    trained: Path = setting(
+        ROOT / "training" / "reproduce" / "quick" / "stability",
         "where the trainings' tables are",
         metavar="DIR",
-        shown="training/results/reproduce/quick",
+        shown="training/reproduce/quick/stability",
     )
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
-        curves = read_curves(self.results / "stability-curves.csv")
-        figure = draw(curves, read_origin(self.results / "stability-trainings.csv"))
+        curves = read_curves(self.trained / "curves.csv")
+        figure = draw(curves, read_origin(self.trained / "trainings.csv"))
         for path in paths:
             save(figure, path)
         return 0

@@ -1,20 +1,24 @@
 """`swarm-mj bench`: how fast the simulation and its parts are on this machine."""
 
+import platform
 import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any, NamedTuple
 
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli import OPTIONS
+from swarm_mj.cli import OPTIONS, bench_decisions
 from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
+from swarm_mj.policies.registry import POLICIES, SHIPPED
 from swarm_mj.system.fields import setting
-from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import plain_console, tell_cores
-from swarm_mj.system.writing import Output, check_outputs
+from swarm_mj.system.packages import commit, is_installed, need, version
+from swarm_mj.system.terminal import num_cores, plain_console, tell_cores
+from swarm_mj.system.writing import Output, check_outputs, write_json
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 HELP = OPTIONS["bench"]
@@ -33,14 +37,24 @@ class BenchOptions:
     jobs: int = setting(2, "processes of that evaluation", low=1, high=256)
     no_learning: bool = setting(False, "leave out the networks and the training")
     robots: tuple[int, ...] = setting((), HELP["robots"], low=2, high=10_000, shown="none")
+    json: Path | None = output_option(None, HELP["json"], metavar="FILE.json")
     plot: Path | None = output_option(None, "draw these teams", metavar="FILE.png|.svg|.pdf")
+
+
+class Measured(NamedTuple):
+    """A table: columns with rows of the same names, which `head` stands above."""
+
+    title: str
+    columns: Mapping[str, Sequence[sim.Row]]
+    head: str = ""
 
 
 def run(options: BenchOptions) -> int:
     """Run the command; return its exit code."""
     if options.plot:
         need("matplotlib", "a chart")
-    check_outputs(Output("--plot", options.plot, ".png|.svg|.pdf"))
+    chart = Output("--plot", options.plot, ".png|.svg|.pdf")
+    check_outputs(Output("--json", options.json, ".json"), chart)
     if options.plot or options.robots:
         _check_teams(set(options.robots))
     tell_cores(options.jobs if options.episodes else 1)
@@ -51,8 +65,10 @@ def run(options: BenchOptions) -> int:
         for table in tables_of(options, status.update):
             tables.append(table)
             steps_us.append(sim.plain_step_us(options.seconds / 4))
-    Console(highlight=False).print(*tables, sep="\n")
+    Console(highlight=False).print(*map(_table, tables), sep="\n")
     plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
+    if options.json:
+        write_json(options.json, document(options, tables, steps_us))
     return 0
 
 
@@ -66,12 +82,44 @@ def noise(steps_us: Sequence[float]) -> str:
     return f"noise: the plain step was {measured}. {others}"
 
 
+def document(
+    options: BenchOptions, tables: Sequence[Measured], steps_us: Sequence[float]
+) -> dict[str, Any]:
+    """Return what is printed, as `--json` has it; a row has one value for each column."""
+    spread = max(steps_us) / min(steps_us) - 1.0
+    about = {"version": version(), "commit": commit(), "cpu": _cpu(), "cores": num_cores()}
+    about |= {"threads": options.threads, "seconds": options.seconds}
+    about["noise"] = {"plain_step_us": steps_us, "spread": spread}
+    return about | {"tables": [_entry(measured) for measured in tables]}
+
+
+def _entry(measured: Measured) -> dict[str, Any]:
+    rows = [
+        {
+            "name": first.name.strip(),
+            "values": [first.value, *(row.value for row in others)],
+            "unit": first.form.partition("}")[2].strip() or None,
+        }
+        for first, *others in zip(*measured.columns.values(), strict=True)
+    ]
+    return {"title": measured.title, "columns": list(measured.columns), "rows": rows}
+
+
+def _cpu() -> str:
+    """Return the processor's model, or its kind where the system does not say."""
+    with suppress(OSError):
+        for line in Path("/proc/cpuinfo").read_text("utf-8").splitlines():
+            if line.startswith("model name"):
+                return line.partition(":")[2].strip()
+    return platform.processor() or platform.machine()
+
+
 def _check_teams(teams: Collection[object]) -> None:
     if len(teams) < 2:
         raise ValueError("growth needs two teams or more that fit, such as --robots 300 1000 3000")
 
 
-def _team_tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:
+def _team_tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Measured]:
     """Measure teams, the smallest first; print which are left out, and why."""
     teams = {}
     for num_robots in sorted(set(options.robots)):
@@ -83,12 +131,12 @@ def _team_tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[
     _check_teams(teams)
     powers = " and ".join(f"{name}: N^{sim.growth(teams, name)[0]:.2f}" for name in sim.GROWING)
     title = f"Growth of the {min(sim.NUM_FITTED, len(teams))} largest teams: {powers}"
-    yield _table(title, teams, head="robots")
+    yield Measured(title, teams, head="robots")
     if options.plot:
         sim.draw_teams(teams, options.plot)
 
 
-def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table]:
+def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Measured]:
     """Make all requested measurements, and print which one is running."""
     say("Measuring missions side by side ...")
     columns = {
@@ -96,30 +144,37 @@ def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Table
         for num_missions in options.missions
     }
     title = "Simulation: 40 robots walk at random, policy round-robin"
-    yield _table(title, columns, head="missions side by side")
+    yield Measured(title, columns, head="missions side by side")
     say("Measuring obstacles and fading ...")
     title = f"World: one window of one of {WORLD_MISSIONS} such missions"
-    yield _table(title, {"": list(sim.world_rows(WORLD_MISSIONS, options.seconds))})
+    yield Measured(title, {"": list(sim.world_rows(WORLD_MISSIONS, options.seconds))})
+    say("Measuring how long policies take to decide ...")
+    is_left_out = options.no_learning or not is_installed("torch")
+    policies = [name for name in POLICIES if not (name == SHIPPED and is_left_out)]
+    columns = {
+        name: list(bench_decisions.decision_rows(mission, policies, options.seconds / 2))
+        for name, mission in bench_decisions.TEAMS.items()
+    }
+    yield Measured("Time to decide: all 40 robots, one window", columns, head="policy")
     if options.episodes:
         say(f"Measuring an evaluation of {options.episodes} missions ...")
         title = f"Evaluation: {options.episodes} random walks of 40 robots, 500 windows each"
         rows = sim.evaluation_rows(options.episodes, options.jobs, options.seconds)
-        yield _table(title, {"": list(rows)})
+        yield Measured(title, {"": list(rows)})
     if not options.no_learning:
         say("Measuring networks and training (a minute or two) ...")
         from swarm_mj.cli import bench_learning  # torch is slow to import
 
         rows = bench_learning.learning_rows(threads=options.threads, seconds=options.seconds)
-        yield _table("Learning: 40 robots at rest", {"": list(rows)})
+        yield Measured("Learning: 40 robots at rest", {"": list(rows)})
 
 
-def _table(title: str, columns: Mapping[str, Sequence[sim.Row]], head: str = "") -> Table:
-    """Return a table of columns with rows of the same names; `head` stands above these names."""
-    table = Table(title=title, title_justify="left", show_header=bool(head))
-    table.add_column(head)
-    for name in columns:
+def _table(measured: Measured) -> Table:
+    table = Table(title=measured.title, title_justify="left", show_header=bool(measured.head))
+    table.add_column(measured.head)
+    for name in measured.columns:
         table.add_column(name, justify="right")
-    for rows in zip(*columns.values(), strict=True):
+    for rows in zip(*measured.columns.values(), strict=True):
         first, *_ = rows
         shown = (row.form.format(row.value) for row in rows)
         table.add_row(first.name, *shown, end_section=first.ends_section)

@@ -35,11 +35,6 @@ from swarm_mj.system.processes import attempt
 ORACLE_EPISODES = 4  # at most: it takes its time
 REPETITIONS = 7  # of each measurement; their median counts, for machines are shared
 MISSION = paper("random-walk")
-PLANNED = {  # missions by what is said of them
-    "planner, 40 robots": MISSION,
-    "planner, 80 robots": replace(MISSION, num_robots=80),
-    "planner, 40 robots that hear 1 km far": replace(MISSION, range_ratio=1.0),
-}
 PLAIN_STEP = "one plain MuJoCo step of 40 robots"
 IN_STEPS = "  in plain MuJoCo steps"
 TEAMS_FLY = "random-flooding"  # a draw for each robot, so the simulation is what is measured
@@ -116,7 +111,7 @@ def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
 
 
 def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterator[Row]:
-    """Time an evaluation of the paper's baselines, the oracle, and the planner.
+    """Time an evaluation of the paper's baselines, and of the oracle.
 
     The jobs share the baselines' missions. The time to start them is included.
     """
@@ -131,8 +126,6 @@ def evaluation_rows(num_episodes: int, num_jobs: int, seconds: float) -> Iterato
     num_oracles = min(num_episodes, ORACLE_EPISODES)
     oracle_s = _flying_s("greedy-oracle", episodes=num_oracles)
     yield Row("greedy-oracle, one mission", oracle_s / num_oracles, "{:.2f} s")
-    for name, mission in PLANNED.items():
-        yield Row(f"{name}: one window of one mission", _planned_window_us(mission, seconds / 4))
     yield Row(PLAIN_STEP, step_us)
 
 
@@ -142,19 +135,6 @@ def _flying_s(*policies: str, episodes: int, jobs: int = 1, mission: Mission = M
     start_s = time.perf_counter()
     list(Local(num_jobs=jobs).run(fly_batch, study.batches))
     return time.perf_counter() - start_s
-
-
-def _planned_window_us(mission: Mission, seconds: float) -> float:
-    """Time a window of a mission that the planner flies [µs]."""
-    # N windows together, for N robots: two epochs of the planner, which each begin with a plan.
-    swarm, planner = Swarm(mission, [0]), make_policy("planner", mission)
-    swarm.start(planner)
-
-    def two_epochs() -> None:
-        for _ in range(mission.num_robots):
-            swarm.step(planner)
-
-    return microseconds(two_epochs, seconds) / mission.num_robots
 
 
 def team_rows(num_robots: int, seconds: float) -> Iterator[Row]:

@@ -10,7 +10,7 @@ from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results
 from swarm_mj.policies.registry import stored_policies
-from swarm_mj.system.fields import check_choice, setting
+from swarm_mj.system.fields import GONE_IN, check_choice, setting
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
@@ -32,7 +32,7 @@ class FiguresOptions:
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
     policy: tuple[str, ...] = setting((), HELP["policy"], metavar="NAME", shown="all")
     force: bool = setting(False, "replace existing figures")
-    yes: bool = setting(False, "ignored: drawing needs little memory")
+    yes: bool = setting(False, f"ignored: drawing needs little memory; goes in {GONE_IN}")
     flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)
     flock_seed: int = setting(1, "its seed", group=FLOCKS)
 

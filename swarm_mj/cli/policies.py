@@ -16,7 +16,14 @@ from rich.table import Column, Table
 from swarm_mj.cli.mission_options import HELP, mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.policies.registry import POLICIES, SHIPPED, flown_name, make_policy, uses_of
+from swarm_mj.policies.registry import (
+    POLICIES,
+    SHIPPED,
+    beyond_paper,
+    flown_name,
+    make_policy,
+    uses_of,
+)
 from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, common_setting, setting
@@ -66,6 +73,7 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
         "is_centralised": policy.is_centralised,
         "window": "broadcasts" if policy.window(mission).is_broadcast else "request",
         "uses": uses_of(name, policy),
+        "beyond_paper": beyond_paper(flown_name(name, mission), policy),
         "payload": policy.payload,
         "packet_bytes": packet.num_bytes,
         "packet_fields": [
@@ -98,9 +106,11 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
 def _print_one(each: dict[str, Any], mission: Mission) -> None:
     names = ["T, M, P"] + ([] if each["payload"] == "none" else [each["payload"]])
     carried = [f"{name}: {CARRIED[name]}" if name in CARRIED else name for name in names]
+    beyond = each["beyond_paper"]  # None where nobody has listed it, as of a user's own policy
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
+        **({} if beyond is None else {"beyond the paper": ", ".join(beyond) or "nothing"}),
         "in a window": _WORDS["windows"][each["window"]],
         "packets carry": "\n".join(carried),
         "packet": f"{each['packet_bytes']:,} bytes",

@@ -13,7 +13,7 @@ from swarm_mj.cli import OPTIONS
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay import view
-from swarm_mj.system.fields import setting
+from swarm_mj.system.fields import GONE_IN, setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import WorkBar, plain_console
@@ -51,7 +51,7 @@ class ReplayOptions:
     fps: int | None = _video(None, HELP["fps"], low=1, high=60, shown="25; GIF: 15")
     scene: str | None = _video(None, HELP["scene"], metavar=SHOWN_AS, shown=BARE)
     force: bool = _video(False, "replace an existing video or picture")
-    yes: bool = _video(False, "ignored: videos are made without an estimate")
+    yes: bool = _video(False, f"ignored: videos need no estimate; goes in {GONE_IN}")
 
 
 def run(options: ReplayOptions) -> int:

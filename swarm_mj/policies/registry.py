@@ -66,6 +66,8 @@ RULES: dict[str, Callable[..., Policy]] = {
 SHIPPED = "gnn"  # in assets/policies/
 _SAID = tomllib.loads(Path(__file__).with_name("uses.toml").read_text("utf-8"))
 USES, PAIR_BYTES = _SAID["uses"], _SAID["pair_bytes"]
+KINDS: dict[str, str] = _SAID["kinds"]  # of information beyond the paper's
+BEYOND: dict[str, list[str]] = _SAID["beyond"]
 POLICIES = (*RULES, SHIPPED)
 
 
@@ -143,8 +145,17 @@ def is_stored(name: str) -> bool:
 
 def uses_of(name: str, policy: Policy) -> str:
     """Return the information that a policy by this name decides by, if known, in a few words."""
+    return policy.uses or USES.get(_entry(name, policy), "")
+
+
+def beyond_paper(name: str, policy: Policy) -> list[str] | None:
+    """Return the kinds of information beyond the paper's that a policy uses; None if unknown."""
+    return BEYOND.get(_entry(name, policy))
+
+
+def _entry(name: str, policy: Policy) -> str:
     payload = "" if policy.payload == "none" else f", {policy.payload}"
-    return policy.uses or USES.get(name.partition(" ")[0] + payload, "")
+    return name.partition(" ")[0] + payload
 
 
 def is_learned(name: str) -> bool:

@@ -21,8 +21,10 @@ KINDS: dict[Any, tuple[type, str]] = {
     float: (Real, "a number"),
     bool: (bool, "True or False"),
 }
+# Until when former names and options that are ignored still work, for help and documentation.
+GONE_IN = "version 2.0, not before 2027-12-01"
 # Fields by the names that they once had. Stored files are read with either name; command lines take
-# both; Python gets the new one.
+# both; Python gets the new one. docs/options.md lists them.
 FORMER_NAMES = {
     "known": "prior_knowledge",
     "switched_off": "failure_fraction",

@@ -1,31 +1,82 @@
 """What the benchmark prints, and what it refuses."""
 
+import json
+
 import pytest
 
-from swarm_mj.cli import bench_learning, bench_simulation, main
+from swarm_mj.cli import bench_decisions, bench_learning, bench_simulation, main
 from swarm_mj.cli.bench import noise
 from swarm_mj.cli.bench_simulation import Row
 
 
 @pytest.mark.slow
-def test_bench_prints_the_whole_and_its_parts(succeed):
-    short = ("--seconds", 0.1, "--episodes", 1, "--no-learning")
+def test_bench_prints_the_whole_and_its_parts(succeed, tmp_path):
+    short = ("--seconds", 0.1, "--episodes", 1, "--no-learning", "--json", "b.json")
     done = succeed("bench", "--missions", 1, 3, *short)
     for row in ("windows simulated per second", "plain MuJoCo step", "radio delivers", "decides"):
         assert row in done.stdout
+    tables = json.loads((tmp_path / "b.json").read_text())["tables"]
+    rows = [row for table in tables for row in table["rows"]]
+    assert all(row["name"] in done.stdout and min(row["values"]) > 0.0 for row in rows)
+    assert [table["columns"] for table in tables[:3]] == [
+        ["1", "3"],
+        [""],
+        ["walking", "stationary"],
+    ]
     for row in ("Evaluation: 1 random walks", "round-robin, mst, --jobs 2", "greedy-oracle"):
         assert row in done.stdout
     assert "Learning" not in done.stdout
-    assert "noise: the plain step was measured 4 times, from" in done.stdout.splitlines()[-1]
+    assert "noise: the plain step was measured 5 times, from" in done.stdout.splitlines()[-1]
 
 
-def test_bench_shows_learning_and_leaves_the_evaluation_out(monkeypatch, capsys):
+@pytest.fixture
+def quick(monkeypatch, here):
+    """A bench whose slow sections take no time; every policy decides in 1234.56 µs."""
     row = Row("train --credit team", 12.34, "{:.1f} / s")
     monkeypatch.setattr(bench_learning, "learning_rows", lambda **_: iter([row]))
-    assert main(["bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0"]) == 0
+    decided = lambda _, names, __: [Row(name, 1234.56, "{:,.1f} µs") for name in names]  # noqa: E731
+    monkeypatch.setattr(bench_decisions, "decision_rows", decided)
+    return here
+
+
+QUICK = ("bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0")
+
+
+def test_bench_shows_learning_and_leaves_the_evaluation_out(quick, capsys):
+    assert main([*QUICK, "--json", "new/b.json"]) == 0
     printed = capsys.readouterr().out
     assert "Evaluation" not in printed
-    assert "train --credit team │ 12.3 / s" in " ".join(printed.split())
+    said = " ".join(printed.split())
+    assert "train --credit team │ 12.3 / s" in said
+    assert "gnn │ 1,234.6 µs │ 1,234.6 µs" in said
+    written = json.loads((quick / "new" / "b.json").read_text())
+    assert (written["threads"], written["seconds"]) == (1, 0.1)
+    assert len(written["noise"]["plain_step_us"]) == 5  # before, and after each table
+    *_, decided, learned = written["tables"]
+    assert decided["columns"] == ["walking", "stationary"]
+    gnn = {"name": "gnn", "values": [1234.56, 1234.56], "unit": "µs"}
+    assert gnn in decided["rows"]
+    assert learned["rows"] == [{"name": "train --credit team", "values": [12.34], "unit": "/ s"}]
+
+
+@pytest.mark.usefixtures("quick")
+def test_no_network_decides_without_learning(capsys):
+    assert main([*QUICK, "--no-learning"]) == 0
+    printed = capsys.readouterr().out
+    assert "greedy-oracle" in printed
+    assert "gnn" not in printed
+
+
+@pytest.mark.parametrize(
+    ("line", "said"),
+    [
+        (("--json", "b.txt"), "--json must be named *.json, not b.txt"),
+        (("--json", "."), "--json . is a folder; name a file"),
+        (("--json", "/proc/no/b.json"), "--json /proc/no/b.json cannot be written"),
+    ],
+)
+def test_a_file_that_cannot_be_written_is_refused_before_the_work(refusal, line, said):
+    assert said in refusal("bench", *line)
 
 
 def test_noise_is_the_spread_of_what_should_be_the_same():
@@ -54,7 +105,7 @@ def teams(monkeypatch, here):
 
 def test_teams_of_several_sizes_show_their_growth(teams, capsys):
     sizes = ("400", "10", "200", "100", "300")
-    chart = ("--plot", "growth.png", "--seconds", "0.1")
+    chart = ("--plot", "growth.png", "--json", "growth.json", "--seconds", "0.1")
     assert main(["bench", "--robots", *sizes, *chart]) == 0
     printed = capsys.readouterr()
     said = " ".join(printed.out.split())
@@ -62,7 +113,10 @@ def test_teams_of_several_sizes_show_their_growth(teams, capsys):
     assert "robots ┃ 10 ┃ 100 ┃ 200 ┃ 300" in said
     assert "400 robots are left out: too large" in printed.err
     assert "Evaluation" not in said
-    assert [path.name for path in teams.iterdir()] == ["growth.png"]
+    assert sorted(path.name for path in teams.iterdir()) == ["growth.json", "growth.png"]
+    (table,) = json.loads((teams / "growth.json").read_text())["tables"]
+    assert table["columns"] == ["10", "100", "200", "300"]
+    assert [row["values"][1] for row in table["rows"]] == pytest.approx([2e3, 3e4])
 
 
 @pytest.mark.parametrize("line", [("--plot", "a.svg"), ("--robots", "10", "400")])

@@ -2,6 +2,7 @@
 
 import json
 import math
+import re
 from pathlib import Path
 
 import pytest
@@ -83,11 +84,14 @@ def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
     shown = printed(capsys, "spatial-tdma", "--task", "stationary")
     assert "positions in its buffer" in shown
     assert "TDMA where robots that are far apart share a slot." in shown
+    assert "beyond the paper" in shown
+    assert re.search(r"beyond the paper\W+nothing", printed(capsys, "random-flooding"))
     assert "fly --policy spatial-tdma --task stationary" in shown
     save_tiny(here / "mine", "local")
     shown = " ".join(printed(capsys, "mine").replace("│", " ").split())
     assert "its buffer, and the packets it sent and received, by a trained graph" in shown
     assert "receptive_field" in shown
+    assert "beyond the paper" not in shown  # nobody has listed what it uses
     assert "fly --policy mine" in shown
     assert main(["policies", "nobody"]) == 2
     assert "nobody" in capsys.readouterr().err

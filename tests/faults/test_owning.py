@@ -158,8 +158,7 @@ def wait_for(address):
         ("swarm_mj", ("evaluate",)),
         ("swarm_mj", ("bench", "--episodes", 0)),
         ("tools/reference_policy.py", ("weights.npz",)),
-        ("training/paper_figures.py", ()),
-        ("training/robustness.py", ()),
+        ("training/results.py", ()),
         ("training/shipped_gnn.py", ()),
     ],
 )

@@ -94,7 +94,6 @@ def test_what_is_no_file_is_refused_by_all_readers(tmp_path, capsys, record_prop
         lambda: main(["figures", name, "--out", out]),
         lambda: main(["fly", "--no-record", "--policy", name]),
         lambda: script(weights.Options, weights.run, [name]),
-        lambda: program("tools", "results_table").main([name]),
         lambda: script(tune.Options, tune.run, ["--policy", "mst", "--out", name]),
     ]
     for code in codes:

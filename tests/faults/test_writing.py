@@ -248,8 +248,7 @@ LOOPED = {  # programs and commands with an output that is a link to itself
     "train": ["swarm_mj", "train", "--out", "loop", "--budget", "1"],
     "tune": [ROOT / "tools" / "tune.py", "--episodes", "2", "--windows", "3", "--out", "loop.csv"],
     "learning figure": [ROOT / "training" / "learning_figure.py", "--out", "loop"],
-    "robustness": [ROOT / "training" / "robustness.py", "--results", "loop"],
-    "paper figures": [ROOT / "training" / "paper_figures.py", "--results", "loop"],
+    "results": [ROOT / "training" / "results.py", "--results", "loop"],
     "shipped gnn": [ROOT / "training" / "shipped_gnn.py", "--results", "loop"],
 }
 

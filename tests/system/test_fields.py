@@ -1,13 +1,25 @@
 """Values that are checked where they are declared."""
 
 import json
+import re
 from dataclasses import asdict, dataclass
+from pathlib import Path
 from typing import Literal
 
 import numpy as np
 import pytest
 
-from swarm_mj.system.fields import check, did_you_mean, kind_of, same_as, setting
+from swarm_mj.system.fields import (
+    FORMER_NAMES,
+    GONE_IN,
+    check,
+    did_you_mean,
+    kind_of,
+    same_as,
+    setting,
+)
+
+ROOT = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -72,3 +84,12 @@ def test_a_field_like_another_has_its_default_and_range():
 def test_the_name_that_was_meant_holds_the_word_or_is_like_it(typed, meant):
     known = ["window_s", "num_windows", "num_robots", "noise_dbm"]
     assert did_you_mean(typed, known) == f"; did you mean {meant}?"
+
+
+def test_former_names_are_listed_with_the_date_until_when_they_work():
+    options = (ROOT / "docs/options.md").read_text().split("## Former names")[1].split("\n## ")[0]
+    rows = re.findall(r"\| `(\w+)` \| `(\w+)` \|$", options, re.MULTILINE)
+    assert dict(rows) == FORMER_NAMES
+    for page in (options, (ROOT / "CHANGELOG.md").read_text()):
+        assert GONE_IN in " ".join(page.split())
+        assert all(f"`{name}`" in page or f"`--{name}" in page for name in FORMER_NAMES)

@@ -3,11 +3,11 @@
 import json
 import os
 import threading
-from dataclasses import dataclass
+from dataclasses import dataclass, make_dataclass
 
 import pytest
 
-from swarm_mj.system.fields import setting
+from swarm_mj.system.fields import FORMER_NAMES, setting
 from swarm_mj.system.reading import open_file, read_document, read_file, read_json, read_plain
 
 
@@ -69,6 +69,14 @@ def test_what_is_no_file_is_refused_at_once(tmp_path, kind):
 def test_json_is_a_dataclass():
     assert read_json(json.dumps(SOUND), Outer) == Outer(inner=Inner(x=1.0), names=("a",))
     assert read_json("[1, 2]", list) == [1, 2]
+
+
+@pytest.mark.parametrize(("former", "present"), FORMER_NAMES.items())
+def test_a_field_is_read_by_its_former_name_too(former, present):
+    kind = make_dataclass("Renamed", [(present, float)], frozen=True)
+    assert read_json(f'{{"{former}": 0.5}}', kind) == kind(0.5)
+    with pytest.raises(ValueError, match="unknown field"):  # which of both would count?
+        read_json(f'{{"{former}": 0.5, "{present}": 0.5}}', kind)
 
 
 @pytest.mark.parametrize(

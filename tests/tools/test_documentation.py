@@ -6,11 +6,14 @@ import re
 import subprocess
 import sys
 from html.parser import HTMLParser
+from importlib import import_module
 from pathlib import Path
 
 import pytest
-from documentation import mission_fields, site_links
+from documentation import mission_fields, names_of, site_links
 from notebook_page import can_render
+
+import swarm_mj
 
 ROOT = Path(__file__).parents[2]
 
@@ -29,6 +32,16 @@ def built(tmp_path_factory):
     assert done.returncode == 0, done.stderr
     assert "WARNING" not in done.stderr
     return folder
+
+
+def test_the_names_that_stay_are_all_at_the_top_and_others_by_where_they_are():
+    names = names_of((ROOT / "docs/api.md").read_text(encoding="utf-8"))
+    assert len(names) == len(set(names))
+    homes = {name: name.rpartition(".")[::2] for name in names}
+    assert {name for home, name in homes.values() if home == "swarm_mj"} == set(swarm_mj.__all__)
+    for home, name in homes.values():
+        assert not name.startswith("_")
+        assert getattr(import_module(home), name) is not None
 
 
 class Loaded(HTMLParser):

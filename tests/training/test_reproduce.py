@@ -3,6 +3,7 @@
 import csv
 import json
 import shutil
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -12,6 +13,7 @@ from synthetic import result
 from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results, write_results
+from swarm_mj.system.packages import commit
 
 ROOT = Path(__file__).parents[2]
 FILE = ROOT / "training" / "reproduce.py"
@@ -44,6 +46,8 @@ class Tiny:
         self.runs = folder / "runs" / "quick" / "fig3"
         self.options = ["--figures", "fig3", "--experiments", str(folder)]
         self.options += ["--results", str(folder / "results"), "--runs", str(folder / "runs")]
+        self.options += ["--policies", str(folder / "policies")]
+        self.kept = folder / "policies" / "quick" / "fig3"
         self.seen = []  # the commands that were called, where they are replaced
         self.broken = set()  # arguments of those that fail
 
@@ -76,7 +80,8 @@ def tiny(tmp_path, made, monkeypatch):
             shutil.copytree(made[0].runs / run.name, run)
         else:
             start, end = arguments.index("--policy") + 1, arguments.index("--task")
-            rows = [result(path, baseline=arguments[start]) for path in arguments[start:end]]
+            paths = arguments[start:end]
+            rows = [replace(result(p, baseline=paths[0]), commit=commit()) for p in paths]
             write_results(Path(arguments[arguments.index("--csv") + 1]), rows)
         return 0
 
@@ -96,7 +101,12 @@ def names(folder):
 def test_a_tiny_experiment_from_nothing_to_its_tables(made):
     tiny, again = made
     results, runs = tiny.results, tiny.runs
-    assert names(results) == ["fig3-curves.csv", "fig3-trainings.csv", "fig3.csv"]
+    assert names(results) == ["fig3.csv"]
+    kept = ["curves.csv", "narrow.safetensors", "trainings.csv", "wide.safetensors"]
+    assert names(tiny.kept) == kept
+    for name in ("narrow", "wide"):
+        stored = (tiny.kept / f"{name}.safetensors").read_bytes()
+        assert stored == (runs / name / "policy.safetensors").read_bytes()
 
     flown = read_results(results / "fig3.csv")
     assert [(r.policy, r.num_robots, r.baseline) for r in flown] == [
@@ -110,13 +120,13 @@ def test_a_tiny_experiment_from_nothing_to_its_tables(made):
     assert [each["receptive_field"] for each in configs] == [0, 0, 1, 1]
     assert {(each["decisions"], each["num_windows"]) for each in configs} == {(64, 5)}
 
-    trained = rows(results / "fig3-trainings.csv")
+    trained = rows(tiny.kept / "trainings.csv")
     assert [row["training"] for row in trained] == ["narrow", "wide"]
     settings = [json.loads(row["settings"]) for row in trained]
     assert [each["network"]["receptive_field"] for each in settings] == [0, 1]
     assert {row["commit"] for row in trained} == {result.commit for result in flown}
 
-    curves = rows(results / "fig3-curves.csv")
+    curves = rows(tiny.kept / "curves.csv")
     for name in ("narrow", "wide"):
         own = [row["aoi"] for row in curves if row["training"] == name]
         assert own == [row["aoi"] for row in rows(runs / name / "curve.csv")]
@@ -139,13 +149,23 @@ def test_it_resumes_where_it_broke_off(tiny):
         for each in tiny.seen
     ]
     assert " ".join(outputs) == "narrow wide wide flights-0.csv flights-1.csv flights-1.csv"
-    assert len(names(tiny.results)) == 3
+    assert names(tiny.results) == ["fig3.csv"]
+
+
+def test_trained_policies_fly_again_at_another_commit_without_training(tiny, monkeypatch):
+    assert tiny() == 0
+    shutil.rmtree(tiny.runs)  # as in a clone
+    tiny.seen.clear()
+    monkeypatch.setattr(program, "commit", lambda: "of another code")
+    assert tiny("--fly", "--episodes 1") == 0
+    assert [command[0] for command in tiny.seen] == ["evaluate", "evaluate"]
+    assert [parse(command)[1].episodes for command in tiny.seen] == [1, 1]
 
 
 def test_runs_of_another_experiment_or_commit_are_not_resumed(tiny, capsys):
     tiny.broken.add(str(tiny.runs / "narrow"))
     assert tiny() == 130
-    tiny.file.write_text(EXPERIMENT.replace("--episodes 2", "--episodes 1"))
+    tiny.file.write_text(EXPERIMENT.replace("--budget 64", "--budget 32"))
     assert tiny() == 2
     said = capsys.readouterr().err.splitlines()[-1]
     assert str(tiny.runs) in said
@@ -203,7 +223,7 @@ def test_an_experiment_flies_all_points_of_its_figure(figure):
     flown = set()
     for _, command, _ in work.flights:
         options = parse(command)[1]
-        assert (options.seed, options.episodes) == (2000, 50)  # as the baselines' missions
+        assert (options.seed, options.episodes) == (2000, 100)  # as the baselines' missions
         for mission in options.missions:
             assert (mission.task, mission.preset) == (shown.task, "paper")
             flown.add(getattr(mission, shown.x_name, None))
@@ -214,7 +234,7 @@ def test_an_experiment_flies_all_points_of_its_figure(figure):
         assert {each["network.receptive_field"] for each in hops} == set(shown.xs)
 
 
-@pytest.mark.parametrize("figure", program.FIGURES)
+@pytest.mark.parametrize("figure", program.PAPERS)
 def test_full_has_the_authors_budget_and_never_stops_before(figure):
     work = program.read_work(figure, program.Settings(scale="full"))
     options = parse(next(iter(work.trainings.values())))[1]
@@ -224,9 +244,7 @@ def test_full_has_the_authors_budget_and_never_stops_before(figure):
 
 
 @pytest.mark.parametrize("figure", program.FIGURES)
-def test_committed_results_are_of_the_experiment_as_it_stands(figure):
+def test_committed_policies_are_of_the_experiment_as_it_stands(figure):
     work = program.read_work(figure, program.Settings())
-    assert work.is_finished, "make reproduce ARGS=--force makes them anew"
-    commits = {row["commit"] for row in rows(work.tables[1])}
-    assert commits == {result.commit for result in read_results(work.tables[0])}
-    assert len(commits) == 1
+    assert work.is_trained, "make reproduce trains them anew"
+    assert len({row["commit"] for row in rows(work.tables[1])}) == 1

@@ -25,7 +25,7 @@ credit,abc,"{""robots"": [40]}"
 
 @pytest.fixture
 def table(tmp_path):
-    path = tmp_path / "stability-curves.csv"
+    path = tmp_path / "curves.csv"
     path.write_text(CURVES)
     return path
 
@@ -52,8 +52,8 @@ def test_the_caption_says_how_many_seeds_and_which_commit(table):
 
 @pytest.mark.usefixtures("table")
 def test_the_files_are_written_where_the_options_say(tmp_path):
-    (tmp_path / "stability-trainings.csv").write_text(TRAININGS)
-    assert program.StabilityFigure(out=tmp_path / "new" / "curves", results=tmp_path)() == 0
+    (tmp_path / "trainings.csv").write_text(TRAININGS)
+    assert program.StabilityFigure(out=tmp_path / "new" / "curves", trained=tmp_path)() == 0
     assert sorted(path.name for path in (tmp_path / "new").iterdir()) == [
         "curves.png",
         "curves.svg",
@@ -76,7 +76,7 @@ def test_a_table_of_something_else_is_refused(table, old, new, said):
 
 
 def test_the_origin_is_one_commit_and_one_team_size(tmp_path):
-    path = tmp_path / "stability-trainings.csv"
+    path = tmp_path / "trainings.csv"
     path.write_text(TRAININGS)
     assert program.read_origin(path) == "teams of 10 robots, shared reward, commit abc"
     others = (("age-2,abc", "age-2,def"), ("[10]", "[20]"), (TRAININGS.partition("\n")[2], ""))

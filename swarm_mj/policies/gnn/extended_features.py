@@ -41,8 +41,8 @@ class ExtendedFeatures(FeatureExtractor):
 
     names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
     uses: ClassVar[str] = (
-        "its buffer, the packets it sent and received, and whose turn it is by the rule of "
-        "spatial-tdma, in the order of identities"
+        "its buffer, the packets it sent and received, the size of the team, and whose turn it is "
+        "by the rule of spatial-tdma, in the order of identities and by the clock"
     )
 
     def start(self, num_missions: int, num_robots: int) -> None:

@@ -1,0 +1,34 @@
+"""The decisions of policies are timed as they fly; how fast they are is no test's business."""
+
+import numpy as np
+
+from swarm_mj.cli import bench_decisions
+from swarm_mj.cli.bench_decisions import TimedSwarm, decision_rows
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.simulation.swarm import Swarm
+
+
+def test_policies_that_plan_take_longer_than_round_robin(monkeypatch):
+    monkeypatch.setattr(bench_decisions, "NUM_WINDOWS", 12)
+    names = ("round-robin", "tdma", "planner")
+    rows = list(decision_rows(paper("random-walk", num_robots=6), names, 0.0))
+    assert [row.name for row in rows] == list(names)
+    turn, slots, planned = (row.value for row in rows)
+    assert 0.0 < turn < planned
+    assert 0.0 < slots < planned
+
+
+def test_the_clock_runs_in_every_slot_and_changes_no_decision(monkeypatch):
+    """Each decision takes a second here; a window has two where robots broadcast, or else one."""
+    ticks = iter(range(1000))
+    monkeypatch.setattr(bench_decisions.time, "thread_time", lambda: float(next(ticks)))
+    mission = paper("stationary", num_robots=6)
+    for name, num_decisions in (("round-robin", 5), ("tdma", 10)):
+        timed, plain = TimedSwarm(mission, [1]), Swarm(mission, [1])
+        for swarm in (timed, plain):
+            swarm.start(make_policy(name, mission))
+            for _ in range(5):
+                swarm.step()
+        assert timed.deciding_s == num_decisions
+        assert np.array_equal(timed.buffers.timestamp, plain.buffers.timestamp)

@@ -1,0 +1,102 @@
+"""All tables are flown from their study files, once, at one commit."""
+
+import csv
+import os
+from pathlib import Path
+
+import pytest
+import results as program
+from results_table import TABLES
+
+from swarm_mj.evaluation.results import read_results
+from swarm_mj.system.exit_codes import DONE, INTERRUPTED
+from swarm_mj.system.packages import commit
+
+ROOT = Path(__file__).parents[2]
+PAPERS = [name for name in program.STUDIES if name.startswith("paper-")]
+
+
+@pytest.fixture(autouse=True)
+def _in_the_checkout(monkeypatch):
+    """Studies name policies by their places in it."""
+    monkeypatch.chdir(ROOT)
+
+
+@pytest.fixture(scope="module")
+def made(tmp_path_factory):
+    """The smallest study's tables, flown as a smoke test."""
+    folder, before = tmp_path_factory.mktemp("made"), Path.cwd()
+    assert fly(folder) == DONE
+    assert Path.cwd() == before
+    return folder
+
+
+def fly(folder, *more):
+    where = ("--results", str(folder), "--jobs", "1")
+    return program.main(["--scale", "smoke", "--studies", "classics", *where, *more])
+
+
+def test_a_table_has_each_policy_in_each_regime_and_a_row_for_each_mission(made):
+    rows = read_results(made / "classics.csv")
+    study = program.study_of("classics")
+    assert [(row.task, row.policy) for row in rows] == [(r.task, p) for r, p in study.pairs]
+    assert {(row.num_windows, row.episodes, row.seed) for row in rows} == {(12, 2, study.seed)}
+    assert {row.commit for row in rows} == {commit()}
+    import pandas as pd
+
+    missions = pd.read_parquet(made / "classics.parquet")
+    assert len(missions) == 2 * len(rows)
+    assert list(missions["aoi"])[:2] == pytest.approx(
+        [rows[0].aoi_mean - rows[0].aoi_std / 2**0.5, rows[0].aoi_mean + rows[0].aoi_std / 2**0.5],
+        abs=2 * rows[0].aoi_std,
+    )
+    assert not list((made / "drafts").iterdir())
+
+
+def test_what_is_there_of_this_commit_is_kept(made, capsys, monkeypatch):
+    before = (made / "classics.csv").stat().st_mtime_ns
+    assert fly(made) == DONE
+    assert "is there; --force flies it again" in capsys.readouterr().err
+    assert (made / "classics.csv").stat().st_mtime_ns == before
+    seen = []
+    monkeypatch.setattr(program, "fly", lambda *given: seen.append(given) or INTERRUPTED)
+    monkeypatch.setattr(program, "commit", lambda: "of another code")
+    assert fly(made) == INTERRUPTED
+    assert len(seen) == 1
+
+
+def test_an_interrupted_study_leaves_no_table(tmp_path, monkeypatch):
+    monkeypatch.setattr(program, "fly", lambda *_: INTERRUPTED)
+    assert fly(tmp_path) == INTERRUPTED
+    assert not list(tmp_path.glob("*.csv"))
+
+
+@pytest.mark.parametrize("name", program.STUDIES)
+def test_every_study_can_be_read_and_says_its_missions(name):
+    study = program.study_of(name)
+    assert study.seed in (2000, 3000)  # never those of tuning or training
+    assert study.pairs
+
+
+@pytest.mark.parametrize("name", PAPERS)
+def test_the_papers_points_are_flown_over_as_many_missions_as_the_papers(name):
+    assert program.study_of(name).episodes == 100
+
+
+@pytest.mark.parametrize("table", TABLES)
+def test_every_table_of_the_docs_is_of_results_that_are_flown(table):
+    spec = TABLES[table]
+    named = [part["results"] for part in (spec, *spec.get("columns", ())) if "results" in part]
+    names = {name for each in named for name in ([each] if isinstance(each, str) else each)}
+    known = {*program.STUDIES, *program.OTHERS, "published", "speed", "exact"}
+    assert {name for name in names if not name.startswith("reproduce/")} <= known
+
+
+@pytest.mark.parametrize("name", program.STUDIES)
+def test_a_committed_table_has_all_rows_of_its_study(name):
+    with (ROOT / "training" / "results" / f"{name}.csv").open(newline="") as file:
+        rows = list(csv.DictReader(file))
+    study = program.study_of(name)
+    assert [row["policy"] for row in rows] == [policy for _, policy in study.pairs]
+    assert {row["episodes"] for row in rows} == {str(study.episodes)}
+    assert os.path.exists(ROOT / "training" / "results" / f"{name}.parquet")
