@@ -106,7 +106,7 @@ def rank_correlation(rows: Sequence[Row]) -> float:
     return float(found.statistic)
 
 
-def stability(_folder: Path) -> str:
+def stability(_folder: Path, trained: Path = TRAINED) -> str:
     """Return both costs of held-out missions at the beginning and at the end of each training."""
     rows = [
         [
@@ -118,7 +118,7 @@ def stability(_folder: Path) -> str:
             "at the end",
         ]
     ]
-    curves = _table("stability", "curves")
+    curves = _table(trained / "stability" / "curves.csv")
     for name in dict.fromkeys(row["training"] for row in curves):
         reward, _, seed = name.partition("-")
         if reward in REWARDS:
@@ -126,18 +126,18 @@ def stability(_folder: Path) -> str:
             ages = [f"{float(row['aoi']):.1f}" for row in (first, last)]
             variances = [f"{float(row['velocity_variance']):.2f}" for row in (first, last)]
             rows.append([REWARDS[reward], seed, *ages, *variances])
-    commits = _listed(row["commit"] for row in _table("stability", "trainings"))
+    commits = _listed(row["commit"] for row in _table(trained / "stability" / "trainings.csv"))
     return (
         f"{_markdown(rows)}\n\n*From `training/reproduce/quick/stability/curves.csv`; commit "
         f"{commits}. `make reproduce` trains them again.*"
     )
 
 
-def trainings(_folder: Path) -> str:
+def trainings(_folder: Path, trained: Path = TRAINED) -> str:
     """Return how much each figure's GNNs were trained: seeds, decisions, minutes and commit."""
     rows = [["figure", "trainings", "seeds", "team decisions of each", "minutes in all", "commit"]]
-    for path in sorted(TRAINED.glob("*/trainings.csv")):
-        its = _table(path.parent.name, "trainings")
+    for path in sorted(trained.glob("*/trainings.csv")):
+        its = _table(path)
         decisions = sorted(int(row["decisions"]) for row in its)
         ends = dict.fromkeys(f"{each:,}" for each in (decisions[0], decisions[-1]))
         rows.append(
@@ -151,12 +151,11 @@ def trainings(_folder: Path) -> str:
             ]
         )
     if len(rows) == 1:
-        raise ValueError(f"{TRAINED} has no table of trainings")
+        raise ValueError(f"{trained} has no table of trainings")
     return _markdown(rows)
 
 
-def _table(figure: str, name: str) -> list[dict[str, str]]:
-    path = TRAINED / figure / f"{name}.csv"
+def _table(path: Path) -> list[dict[str, str]]:
     return [row for _, row in read_rows(path, "table of trainings", MAX_BYTES)]
 
 

@@ -134,14 +134,20 @@ def _age(age: _Age) -> str:
 def exact_table(folder: Path) -> str:
     """Return floor and optimum of small teams, as Markdown for docs/bounds.md."""
     teams = [row for _, row in read_rows(folder / "exact.csv", "table of optima", MOST_BYTES)]
-    rows = [["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]", "ratio"]]
+    rows = [
+        ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]", "floor / optimum"]
+    ]
     rows.append(["---"] * len(rows[0]))
     for team in teams:
         floor, optimum, ratio = (
             float(team[name]) for name in ("floor_windows", "optimum_windows", "ratio")
         )
         rows.append([team["team"], f"{floor:.3f}", f"{optimum:.3f}", f"{ratio:.2f}"])
-    return _markdown(rows)
+    commits = " and ".join(sorted({team["commit"] for team in teams}))
+    return (
+        f"{_markdown(rows)}\n\n*From `exact`; commit {commits}. `make results STUDIES=floor` "
+        "computes them again.*"
+    )
 
 
 def _markdown(rows: Sequence[Sequence[str]]) -> str:

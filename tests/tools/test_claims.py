@@ -18,9 +18,8 @@ def folder(tmp_path):
 
 
 @pytest.fixture
-def trained(tmp_path, monkeypatch):
+def trained(tmp_path):
     """Write tables of a figure's trainings."""
-    monkeypatch.setattr(claims, "TRAINED", tmp_path)
 
     def write(figure, name, rows):
         (tmp_path / figure).mkdir(exist_ok=True)
@@ -105,7 +104,7 @@ def test_correlations_with_and_without_those_who_know_more(folder):
     assert others == ["without `planner` and `greedy-oracle` (3)", *["1.00"] * 4]
 
 
-def test_stability_has_the_first_and_the_last_row_of_each_training(trained):
+def test_stability_has_the_first_and_the_last_row_of_each_training(trained, tmp_path):
     curves = [
         {"training": name, "decisions": decisions, "aoi": aoi, "velocity_variance": variance}
         for name, decisions, aoi, variance in (
@@ -120,7 +119,7 @@ def test_stability_has_the_first_and_the_last_row_of_each_training(trained):
     ]
     trained("stability", "curves", curves)
     trained("stability", "trainings", [{"training": "age-1", "commit": "abc123"}])
-    text = claims.stability(claims.TRAINED)
+    text = claims.stability(tmp_path, tmp_path)
     assert cells(text) == [
         ["the age", "1", "11.6", "10.1", "0.09", "0.08"],
         ["the velocity variance", "2", "11.6", "56.6", "0.09", "0.44"],
@@ -128,7 +127,7 @@ def test_stability_has_the_first_and_the_last_row_of_each_training(trained):
     assert "commit abc123." in text
 
 
-def test_trainings_are_counted_by_figure(trained):
+def test_trainings_are_counted_by_figure(trained, tmp_path):
     for figure, decisions in (("fig4", (40448, 60416)), ("fig6", (40448,))):
         rows = [
             {
@@ -140,13 +139,12 @@ def test_trainings_are_counted_by_figure(trained):
             for seed, each in enumerate(decisions, start=1)
         ]
         trained(figure, "trainings", rows)
-    assert cells(claims.trainings(claims.TRAINED)) == [
+    assert cells(claims.trainings(tmp_path, tmp_path)) == [
         ["fig4", "2", "1, 2", "40,448 to 60,416", "5", "abc123"],
         ["fig6", "1", "1", "40,448", "2", "abc123"],
     ]
 
 
-@pytest.mark.usefixtures("trained")
-def test_no_trainings_are_no_table():
+def test_no_trainings_are_no_table(tmp_path):
     with pytest.raises(ValueError, match="no table of trainings"):
-        claims.trainings(claims.TRAINED)
+        claims.trainings(tmp_path, tmp_path)
