@@ -94,7 +94,8 @@ test-engines: $(DEV) .venv/engines/ready
 	@touch $@
 
 attack: $(DEV)
-	SWARM_MJ_TRIES=20 $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)
+	SWARM_MJ_TRIES=20 SWARM_MJ_FAULTS=training/results/attack.csv \
+	  $(BIN)/python -m pytest --numprocesses 2 tests/faults $(ARGS)
 
 reference: setup .venv/ns3/ready
 	$(BIN)/python training/reference/ns3.py $(ARGS)

@@ -4,8 +4,8 @@
     python training/results.py --scale smoke    # the same structure, a few windows each: minutes
     python training/results.py --studies paper-random-walk channels
 
-Each file of `training/studies/` is a study, flown as `swarm-mj study run` does; beside them fly the
-trained policies of `reproduce.py`, and the experiments that no study can describe. Each leaves a
+Each file of `training/studies/` is a study, flown as `swarm-mj study run` does. `gnn` flies the
+trained policies of `reproduce.py`; `deciding` runs `swarm-mj bench`. Each leaves a
 table of its name in `training/results/`: `NAME.csv` has a row for each policy and regime,
 `NAME.parquet` one for each mission. What is there of this commit is kept; `--force` flies it again.
 An interrupted run continues where it broke off. Then `tools/results_table.py` writes the numbers
@@ -25,6 +25,7 @@ import bounds
 import flocking_converges
 import reproduce
 
+from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.cli.evaluate import StudyFlags, fly
 from swarm_mj.cli.study import read_study
@@ -32,8 +33,8 @@ from swarm_mj.evaluation.study import Study
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.packages import commit
-from swarm_mj.system.reading import read_file
-from swarm_mj.system.writing import Output, check_outputs, write_bytes
+from swarm_mj.system.reading import read_file, read_json
+from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv
 
 ROOT = Path(__file__).resolve().parent.parent
 SCALES = ("paper", "smoke")
@@ -41,6 +42,7 @@ MISSIONS, WINDOWS = 2, 12  # of smoke, each study's
 FOLDER = ROOT / "training" / "studies"
 SHIPPED = {"impairments": "impairments-small"}  # with the package, under other names
 STUDIES = tuple(sorted([*SHIPPED, *(path.stem for path in FOLDER.glob("*.toml"))]))
+OTHERS = ("gnn", "floor", "converging", "deciding")  # tables that no study can describe
 KINDS = (".csv", ".parquet")
 MAX_BYTES = 100_000_000
 
@@ -51,9 +53,9 @@ class Settings:
 
     scale: str = setting("paper", "how much is flown", choices=SCALES)
     studies: tuple[str, ...] = setting(
-        (*STUDIES, "floor", "converging", "gnn"),
+        (*STUDIES, *OTHERS),
         "which tables",
-        choices=(*STUDIES, "floor", "converging", "gnn"),
+        choices=(*STUDIES, *OTHERS),
         shown="all",
     )
     results: Path | None = setting(
@@ -133,7 +135,25 @@ def fly_gnn(settings: Settings) -> int:
     return reproduce.run(replace(usual, fly=few, results=settings.folder / "reproduce"))
 
 
-OTHERS: dict[str, Callable[[Settings], int]] = {
+def measure_deciding(settings: Settings) -> int:
+    """Time this machine, and the policies' decisions; return the exit code."""
+    path, out = settings.folder / "bench.json", settings.folder / "deciding.csv"
+    few = ["--missions", "1", "--seconds", "0.1", "--no-learning"] if settings.is_smoke else []
+    code = swarm_mj(["bench", "--episodes", "0", *few, "--json", str(path)])
+    if code == DONE:
+        found = read_json(read_file(path, "bench", MAX_BYTES), dict)
+        [table] = [each for each in found["tables"] if each["title"].startswith("Time to decide")]
+        rows = [
+            {"policy": row["name"], "walking_ms": walking_us / 1e3, "at_rest_ms": resting_us / 1e3}
+            for row in table["rows"]
+            for walking_us, resting_us in [row["values"]]
+        ]
+        write_csv(out, (*rows[0], "commit"), (row | {"commit": found["commit"]} for row in rows))
+    return code
+
+
+FLOWN_BY: dict[str, Callable[[Settings], int]] = {
+    "deciding": measure_deciding,
     "floor": fly_floor,
     "converging": fly_converging,
     "gnn": fly_gnn,
@@ -157,7 +177,7 @@ def run(settings: Settings) -> int:
             continue
         say(f"Table {number} of {len(settings.studies)}")
         with chdir(ROOT):
-            code = OTHERS[name](settings) if name in OTHERS else fly_study(settings, name)
+            code = FLOWN_BY[name](settings) if name in OTHERS else fly_study(settings, name)
         if code != DONE:
             return code
     return DONE

@@ -3,13 +3,18 @@
 A test is one try unless it records how many "tries" it makes.
 """
 
+import csv
 import os
 from collections import Counter
+from pathlib import Path
 
 import pytest
 
+from swarm_mj.system.packages import commit
+
 CLASS = "fault class"
 FACTOR = float(os.environ.get("SWARM_MJ_TRIES", "1"))
+TABLE = os.environ.get("SWARM_MJ_FAULTS")  # where the counts go
 
 
 def pytest_configure(config):
@@ -50,3 +55,9 @@ def pytest_terminal_summary(terminalreporter):
         terminalreporter.section("faults: tried and held")
         for name in sorted(tried):
             terminalreporter.line(f"{name:<44} {tried[name]:>6} tried  {held[name]:>6} held")
+    if tried and TABLE:
+        with Path(TABLE).open("w", newline="", encoding="utf-8") as file:
+            writer = csv.writer(file)
+            writer.writerow(["fault", "tried", "held", "commit"])
+            writer.writerows((each, tried[each], held[each], commit()) for each in sorted(tried))
+            writer.writerow(["all", tried.total(), held.total(), commit()])
