@@ -1,6 +1,6 @@
 """A floor for teams at rest: an age of information that no policy can go below (`docs/bounds.md`).
 
-    python training/bounds.py                    # training/results/floor.csv
+    python training/bounds.py                    # training/results/floor.csv and exact.csv
     python training/bounds.py --teams 3 --seconds 60
 
 The lemmas of `docs/bounds.md` are named where they are used. What is proven holds for every policy,
@@ -25,7 +25,8 @@ from scipy.sparse.csgraph import shortest_path
 from swarm_mj.cli import script
 from swarm_mj.mission import paper
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
-from swarm_mj.radio.links import Links, air_of, lone_probabilities
+from swarm_mj.radio.links import Links, air_of, links_between, lone_probabilities
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.radio.reception import decoded, incoming_at
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.fields import setting
@@ -36,6 +37,14 @@ RESULTS = Path(__file__).resolve().parent / "results"
 RANGE_RATIOS = (0.2, 0.25, 0.5, 0.75, 1.0)
 MOST_LINKS = 400  # of teams whose receptions are searched
 SLACK = 1e-9  # of powers, so that rounding in a programme only raises the number of receptions
+SMALL_TEAMS = {  # positions [m]; a packet reaches 250 m
+    "2 robots, 100 m apart": ((0, 0), (100, 0)),
+    "3 robots in range of each other": ((0, 0), (100, 0), (0, 100)),
+    "3 robots in a line, 200 m apart": ((0, 0), (200, 0), (400, 0)),
+    "4 robots in a square of 240 m": ((0, 0), (240, 0), (240, 240), (0, 240)),
+    "4 robots in a line, 200 m apart": ((0, 0), (200, 0), (400, 0), (600, 0)),
+}
+CAP = 7  # slots: ages of small teams count as that at most; 6 and 8 give the same optima
 
 
 def floor_windows(links: Links, seconds: float) -> float:
@@ -244,6 +253,17 @@ class Floor:
 
 
 @dataclass(frozen=True, kw_only=True)
+class Exact:
+    """A small team, for which the optimum was found."""
+
+    team: str
+    floor_windows: float
+    optimum_windows: float
+    ratio: float
+    commit: str
+
+
+@dataclass(frozen=True, kw_only=True)
 class Settings:
     """Which teams get a floor."""
 
@@ -251,7 +271,9 @@ class Settings:
     seed: int = setting(2000, "of the first mission")
     robots: int = setting(40, "in a team", low=2, high=100)
     seconds: float = setting(2.0, "for the search of each team", low=0.1, high=1e4)
-    out: Path = setting(RESULTS / "floor.csv", "the table", metavar="FILE.csv")
+    out: Path = setting(
+        RESULTS / "floor.csv", "the floors; exact.csv goes beside it", metavar="FILE.csv"
+    )
 
 
 def rows(settings: Settings, range_ratio: float) -> Iterator[Floor]:
@@ -281,15 +303,36 @@ def mean_floor(table: Sequence[Floor], range_ratio: float) -> float:
     return float(np.mean([row.floor_windows for row in table if row.range_ratio == range_ratio]))
 
 
+def exact_rows(seconds: float) -> Iterator[Exact]:
+    """Return floor and optimum of the small teams."""
+    radio = radio_of(paper("stationary"))
+    for team, position_m in SMALL_TEAMS.items():
+        links = links_between(radio, np.array(position_m, dtype=float))
+        floor, (optimum, _) = floor_windows(links, seconds), exact_age(links, CAP)
+        yield Exact(
+            team=team,
+            floor_windows=floor,
+            optimum_windows=optimum,
+            ratio=floor / optimum,
+            commit=commit() or "",
+        )
+
+
 def run(settings: Settings) -> int:
-    """Write the table and print the means; return the exit code."""
-    check_outputs(Output("table", settings.out, ".csv"))
+    """Write both tables and print the means; return the exit code."""
+    exact = settings.out.with_name("exact.csv")
+    check_outputs(Output("table", settings.out, ".csv"), Output("small teams", exact, ".csv"))
     table: list[Floor] = []
     for range_ratio in RANGE_RATIOS:
         table += rows(settings, range_ratio)
         print(f"range ratio {range_ratio:g}: {mean_floor(table, range_ratio):.2f} windows")
-    write_csv(settings.out, [field.name for field in fields(Floor)], (asdict(r) for r in table))
+    _write(settings.out, Floor, table)
+    _write(exact, Exact, list(exact_rows(settings.seconds)))
     return 0
+
+
+def _write(path: Path, kind: type[Floor | Exact], table: Sequence[Floor | Exact]) -> None:
+    write_csv(path, [field.name for field in fields(kind)], (asdict(row) for row in table))
 
 
 if __name__ == "__main__":

@@ -3,7 +3,8 @@
     python training/limits_figure.py
 
 Draws assets/figures/policies/fig4.svg and .png from `training/results/`: the package's policies,
-the floor of `bounds.py`, proven for every policy, and the schedules of `ceiling.py`.
+the floor of `bounds.py`, proven for every policy, and the schedules of `ceiling.py`. Also makes the
+tables of `docs/bounds.md` from the same results.
 """
 
 import math
@@ -11,6 +12,7 @@ import sys
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -27,10 +29,11 @@ from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_BYTES = 10_000_000
+SEARCHED, PLANNER = "training.ceiling:Annealed", "planner --payload none"
 FIGURE = RESULT_FIGURES["fig4"]
 METHODS = (
     *("planner", "planner --payload none", "gnn", "spatial-tdma", "tdma", "gossip", "aloha"),
-    *("random-flooding", "training.ceiling:Annealed"),
+    *("random-flooding", SEARCHED),
 )
 
 
@@ -80,6 +83,75 @@ def read_floor(path: Path) -> tuple[Curve, str]:
         mean=np.array([np.mean(found[ratio]) for ratio in x]),
         sem=np.array([np.std(found[r], ddof=1) / math.sqrt(len(found[r])) for r in x]),
     ), made_by
+
+
+def table(folder: Path) -> str:
+    """Return floor, searched schedule and planner by range ratio, as Markdown for docs/bounds.md.
+
+    Raises ValueError if a table lacks a range ratio that the floor has.
+    """
+    floor, _ = read_floor(folder / "floor.csv")
+    ratios = floor.x.tolist()
+    searched = _steady(folder / "ceiling.csv", SEARCHED, ratios)
+    planner = _steady(folder / "paper-stationary.csv", PLANNER, ratios)
+    both = list(zip(searched, planner, strict=True))
+    rows = [
+        ["range ratio", *(f"{ratio:g}" for ratio in ratios)],
+        ["---"] * (len(ratios) + 1),
+        ["proven floor", *(f"{age:.2f}" for age in floor.mean)],
+        ["searched schedule, steady state", *map(_age, searched)],
+        [f"`{PLANNER}`, steady state", *map(_age, planner)],
+        [
+            "floor / searched schedule",
+            *(f"{low / its.mean:.2f}" for low, its in zip(floor.mean, searched, strict=True)),
+        ],
+        ["searched schedule / planner", *(f"{its.mean / ours.mean:.2f}" for its, ours in both)],
+    ]
+    return _markdown(rows)
+
+
+class _Age(NamedTuple):
+    mean: float
+    sem: float
+
+
+def _steady(path: Path, policy: str, ratios: Sequence[float]) -> list[_Age]:
+    """Return a policy's age in the second half of the missions, by range ratio."""
+    found = {
+        result.range_ratio: _Age(result.aoi_steady_mean, result.aoi_steady_sem or math.nan)
+        for result in read_results(path)
+        if result.policy == policy
+    }
+    if missing := [f"{ratio:g}" for ratio in ratios if ratio not in found]:
+        raise ValueError(f"{path} has no {policy} at range ratio {', '.join(missing)}")
+    return [found[ratio] for ratio in ratios]
+
+
+def _age(age: _Age) -> str:
+    return f"{age.mean:.2f} ± {age.sem:.2f}"
+
+
+def exact_table(folder: Path) -> str:
+    """Return floor and optimum of small teams, as Markdown for docs/bounds.md."""
+    teams = [row for _, row in read_rows(folder / "exact.csv", "table of optima", MOST_BYTES)]
+    rows = [
+        ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]", "floor / optimum"]
+    ]
+    rows.append(["---"] * len(rows[0]))
+    for team in teams:
+        floor, optimum, ratio = (
+            float(team[name]) for name in ("floor_windows", "optimum_windows", "ratio")
+        )
+        rows.append([team["team"], f"{floor:.3f}", f"{optimum:.3f}", f"{ratio:.2f}"])
+    commits = " and ".join(sorted({team["commit"] for team in teams}))
+    return (
+        f"{_markdown(rows)}\n\n*From `exact`; commit {commits}. `make results STUDIES=floor` "
+        "computes them again.*"
+    )
+
+
+def _markdown(rows: Sequence[Sequence[str]]) -> str:
+    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
 def draw_limits(results: Sequence[Result], floor: Curve, made_by: str) -> Figure:

@@ -1,3 +1,5 @@
+import csv
+
 import numpy as np
 import pytest
 
@@ -5,6 +7,7 @@ from swarm_mj.mission import paper
 from swarm_mj.radio.links import links_between
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
+from training import bounds
 from training.bounds import (
     exact_age,
     floor_windows,
@@ -85,3 +88,17 @@ def test_informed_pairs_double_until_receptions_or_hops_limit_them():
 
 def test_hops_are_counted_over_links_in_silence():
     assert hop_counts(LINE).tolist() == [[0, 1, 2], [1, 0, 1], [2, 1, 0]]
+
+
+def test_a_table_of_small_teams_stands_beside_the_floors(tmp_path, monkeypatch):
+    monkeypatch.setattr(bounds, "SMALL_TEAMS", {"two": ((0, 0), (100, 0))})
+    monkeypatch.setattr(bounds, "RANGE_RATIOS", (1.0,))
+    assert bounds.run(bounds.Settings(teams=1, robots=3, out=tmp_path / "floor.csv")) == 0
+    with (tmp_path / "exact.csv").open(newline="") as file:
+        [row] = csv.DictReader(file)
+    assert row["team"] == "two"
+    # One of four ages is a slot, half a window.
+    assert float(row["floor_windows"]) == pytest.approx(1 / 8)
+    assert float(row["optimum_windows"]) == pytest.approx(1 / 8, abs=1e-3)
+    assert float(row["ratio"]) == pytest.approx(1.0, abs=1e-2)
+    assert (tmp_path / "floor.csv").exists()

@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 from synthetic import result
 
-from training.limits_figure import draw_limits, read_floor
+from swarm_mj.evaluation.results import write_results
+from training.limits_figure import draw_limits, exact_table, read_floor, table
 
 HEADER = "range_ratio,floor_windows,commit\n"
 
@@ -39,3 +40,49 @@ def test_the_floor_is_named_under_the_policies_and_its_commit_stands_below(floor
     texts = {text.get_text() for text in figure.findobj(lambda a: hasattr(a, "get_text"))}
     assert {"TDMA", "proven floor"} <= texts
     assert any("abcdef0" in text for text in texts)
+
+
+def steady(policy, ages, **overrides):
+    """Results whose age in the second half of the missions is given by range ratio."""
+    return [
+        result(policy, range_ratio=ratio, aoi_steady_mean=age, aoi_steady_sem=0.25, **overrides)
+        for ratio, age in ages.items()
+    ]
+
+
+@pytest.fixture
+def folder(tmp_path, floor):
+    floor.write_text(floor.read_text() + "0.5,1.0,abcdef012345\n")
+    write_results(
+        tmp_path / "ceiling.csv", steady("training.ceiling:Annealed", {0.25: 5.0, 0.5: 4.0})
+    )
+    flown = steady("planner --payload none", {0.5: 8.0, 0.25: 6.25}) + steady("tdma", {0.25: 20.0})
+    write_results(tmp_path / "paper-stationary.csv", flown)
+    return tmp_path
+
+
+def test_the_table_divides_the_floor_by_the_schedule_and_that_by_the_planner(folder):
+    assert table(folder).splitlines() == [
+        "| range ratio | 0.25 | 0.5 |",
+        "| --- | --- | --- |",
+        "| proven floor | 2.50 | 1.00 |",
+        "| searched schedule, steady state | 5.00 ± 0.25 | 4.00 ± 0.25 |",
+        "| `planner --payload none`, steady state | 6.25 ± 0.25 | 8.00 ± 0.25 |",
+        "| floor / searched schedule | 0.50 | 0.25 |",
+        "| searched schedule / planner | 0.80 | 0.50 |",
+    ]
+
+
+def test_a_table_without_a_range_ratio_of_the_floor_is_refused(folder):
+    write_results(folder / "ceiling.csv", steady("training.ceiling:Annealed", {0.25: 5.0}))
+    with pytest.raises(ValueError, match=r"has no training.ceiling:Annealed at range ratio 0.5"):
+        table(folder)
+
+
+def test_small_teams_stand_in_a_table_of_their_own(tmp_path):
+    (tmp_path / "exact.csv").write_text(
+        "team,floor_windows,optimum_windows,ratio,commit\ntwo,0.125,0.25,0.5,abcdef012345\n"
+    )
+    _, _, team, _, origin = exact_table(tmp_path).splitlines()
+    assert team == "| two | 0.125 | 0.250 | 0.50 |"
+    assert "commit abcdef012345." in origin

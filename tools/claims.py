@@ -1,0 +1,172 @@
+"""Tables of docs/claims.md whose numbers no single result has: they are computed from several."""
+
+import json
+import math
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, cast
+
+import numpy as np
+from results_rows import PAPER, Row, Rows, read, select
+from scipy.stats import spearmanr
+
+from swarm_mj.system.reading import read_rows
+
+ROOT = Path(__file__).resolve().parent.parent
+TRAINED = ROOT / "training" / "reproduce" / "quick"  # the trainings, a folder for each figure
+MAX_BYTES = 10_000_000
+BASELINES = ["mst", "random-flooding", "round-robin"]
+GNNS = ["GNN", "GNN, seed 2", "GNN, seed 3"]
+RANGE_RATIOS = (0.2, 0.25, 0.5, 0.75, 1.0)
+VELOCITY_RATIOS = (0.15, 0.25, 0.325, 0.5)
+INFORMED = ("planner", "planner --payload none", "greedy-oracle")
+REWARDS = {"age": "the age", "variance": "the velocity variance"}  # by a training's name
+
+
+@dataclass(frozen=True, kw_only=True)
+class Margin:
+    """How much younger the information is with the GNN than with the best baseline."""
+
+    windows: float
+    windows_sem: float
+    share: float  # of the baseline's age
+    share_sem: float
+
+
+def margins(folder: Path) -> str:
+    """Return the GNNs' margins over the best baseline, here and as published (Fig. 4)."""
+    rows = [["margin over the best baseline, by range ratio [km]", *map(_short, RANGE_RATIOS)]]
+    for whose, ours, theirs in (
+        ("ours", ["reproduce/quick/fig4"], ["paper-stationary"]),
+        ("published", [PAPER], [PAPER]),
+    ):
+        found = [
+            margin(
+                select(read(ours, folder), {"policy": GNNS} | place),
+                select(read(theirs, folder), {"policy": BASELINES} | place),
+            )
+            for ratio in RANGE_RATIOS
+            for place in [{"range_ratio": ratio, "figure": ["fig4", "none"]}]
+        ]
+        rows.append(
+            [f"{whose} [windows]", *(f"{m.windows:.1f} ± {m.windows_sem:.1f}" for m in found)]
+        )
+        rows.append(
+            [
+                f"{whose} [%]",
+                *(f"{m.share:.0%} ± {m.share_sem:.0%}".replace("%", "") for m in found),
+            ]
+        )
+    return _markdown(rows)
+
+
+def margin(gnns: Rows, baselines: Rows) -> Margin:
+    """Return the margin of trainings that flew the same missions over the baseline of least age.
+
+    Errors are of missions, and as if the baseline had flown others.
+    """
+    if not (gnns and baselines):
+        raise ValueError("a margin needs a GNN and a baseline")
+    best = min(baselines, key=lambda row: row["aoi_mean"])
+    age, error = (float(np.mean([row[name] for row in gnns])) for name in ("aoi_mean", "aoi_sem"))
+    ratio = age / best["aoi_mean"]
+    return Margin(
+        windows=best["aoi_mean"] - age,
+        windows_sem=math.hypot(error, best["aoi_sem"]),
+        share=1.0 - ratio,
+        share_sem=ratio * math.hypot(error / age, best["aoi_sem"] / best["aoi_mean"]),
+    )
+
+
+def correlation(folder: Path) -> str:
+    """Return the rank correlations of age and velocity variance over the policies (Fig. 6)."""
+    flown = read(["paper-flocking"], folder)
+    rows = [["rank correlation, by velocity ratio", *map(_short, VELOCITY_RATIOS)]]
+    for name, left_out in (
+        ("all policies", ()),
+        ("without `planner` and `greedy-oracle`", INFORMED),
+    ):
+        policies = [row for row in flown if row["policy"] not in left_out]
+        cells = [
+            f"{rank_correlation(select(policies, {'velocity_ratio': ratio})):.2f}"
+            for ratio in VELOCITY_RATIOS
+        ]
+        count = len({row["policy"] for row in policies})
+        rows.append([f"{name} ({count})", *cells])
+    return _markdown(rows)
+
+
+def rank_correlation(rows: Sequence[Row]) -> float:
+    """Return Spearman's coefficient of the mean ages and the mean velocity variances."""
+    ages, variances = (
+        [row[f"{cost}_mean"] for row in rows] for cost in ("aoi", "velocity_variance")
+    )
+    found = cast(Any, spearmanr(ages, variances))  # stubs have an empty class
+    return float(found.statistic)
+
+
+def stability(_folder: Path, trained: Path = TRAINED) -> str:
+    """Return both costs of held-out missions at the beginning and at the end of each training."""
+    rows = [
+        [
+            "trained on",
+            "seed",
+            "age at first",
+            "at the end",
+            "velocity variance at first",
+            "at the end",
+        ]
+    ]
+    curves = _table(trained / "stability" / "curves.csv")
+    for name in dict.fromkeys(row["training"] for row in curves):
+        reward, _, seed = name.partition("-")
+        if reward in REWARDS:
+            first, *_, last = (row for row in curves if row["training"] == name)
+            ages = [f"{float(row['aoi']):.1f}" for row in (first, last)]
+            variances = [f"{float(row['velocity_variance']):.2f}" for row in (first, last)]
+            rows.append([REWARDS[reward], seed, *ages, *variances])
+    commits = _listed(row["commit"] for row in _table(trained / "stability" / "trainings.csv"))
+    return (
+        f"{_markdown(rows)}\n\n*From `training/reproduce/quick/stability/curves.csv`; commit "
+        f"{commits}. `make reproduce` trains them again.*"
+    )
+
+
+def trainings(_folder: Path, trained: Path = TRAINED) -> str:
+    """Return how much each figure's GNNs were trained: seeds, decisions, minutes and commit."""
+    rows = [["figure", "trainings", "seeds", "team decisions of each", "minutes in all", "commit"]]
+    for path in sorted(trained.glob("*/trainings.csv")):
+        its = _table(path)
+        decisions = sorted(int(row["decisions"]) for row in its)
+        ends = dict.fromkeys(f"{each:,}" for each in (decisions[0], decisions[-1]))
+        rows.append(
+            [
+                path.parent.name,
+                str(len(its)),
+                _listed(str(json.loads(row["settings"])["seed"]) for row in its),
+                " to ".join(ends),
+                f"{sum(float(row['minutes']) for row in its):.0f}",
+                _listed(row["commit"] for row in its),
+            ]
+        )
+    if len(rows) == 1:
+        raise ValueError(f"{trained} has no table of trainings")
+    return _markdown(rows)
+
+
+def _table(path: Path) -> list[dict[str, str]]:
+    return [row for _, row in read_rows(path, "table of trainings", MAX_BYTES)]
+
+
+def _listed(values: Iterable[Any]) -> str:
+    return ", ".join(sorted(set(values)))
+
+
+def _short(value: float) -> str:
+    return f"{value:g}"
+
+
+def _markdown(rows: Sequence[Sequence[str]]) -> str:
+    head, *others = rows
+    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *others))
