@@ -6,6 +6,7 @@ Writes assets/figures/learning.svg and .png.
 """
 
 import sys
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import mean
@@ -16,19 +17,18 @@ from swarm_mj.api.charts import draw_learning
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.style import save
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.learning.run_folder import read_curve
 from swarm_mj.system.fields import setting
 from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "training" / "results" / "learning"
+RESULTS = ROOT / "training" / "results"
+CURVE = "learning/rest-curve.csv"  # of the shipped weights' training
 SCHEDULES = ("tdma", "spatial-tdma")
+SIZES = (20, 40, 80)  # of the teams that they were trained on
 LABEL = "the shipped gnn, mean over teams of 20, 40 and 80 robots at rest"
-SAID = (
-    "Curve: 12 held-out missions a size, mean ± SEM. Levels: 8 missions a size from seed 3000. "
-    "training/shipped_gnn.py, seed 1, commit e15dd2968009"
-)
+TRAINED = "12 held-out missions a size, mean ± SEM, seed 1, commit e15dd2968009"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -42,9 +42,9 @@ class LearningFigure:
     )
     results: Path = setting(
         RESULTS,
-        "where the experiment left them",
+        "where they are",
         metavar="DIR",
-        shown="training/results/learning",
+        shown="training/results",
     )
 
     def __call__(self) -> int:
@@ -52,22 +52,48 @@ class LearningFigure:
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
         quiet_matplotlib()
-        rows = read_curve(self.results / "rest-curve.csv")
+        rows = read_curve(self.results / CURVE)
         age, error = (np.array([row[name] for row in rows]) for name in ("aoi", "aoi_sem"))
         decisions = np.array([row["decisions"] for row in rows])
         lines = {LABEL: np.array([decisions, age, age - error, age + error])}
-        figure = draw_learning(lines, self._levels(), SAID)
+        levels = read_levels(self.results / "shipped-gnn.csv")
+        figure = draw_learning(lines, ages(levels), caption(levels))
         for path in paths:
             save(figure, path)
         return 0
 
-    def _levels(self) -> dict[str, float]:
-        """Return the schedules' ages, means over the same team sizes [windows]."""
-        results = read_results(self.results / "candidates-rest.csv")
-        return {
-            name: mean(result.aoi_mean for result in results if result.policy == name)
-            for name in SCHEDULES
-        }
+
+def read_levels(path: Path) -> list[Result]:
+    """Return the schedules' results in the teams that the policy was trained on.
+
+    Raises ValueError if the file cannot be read, or some of them are missing.
+    """
+    found = [
+        result
+        for result in read_results(path)
+        if result.policy in SCHEDULES
+        and (result.task, result.num_robots in SIZES) == ("stationary", True)
+    ]
+    if len(found) != len(SCHEDULES) * len(SIZES):
+        raise ValueError(f"{path} must have {' and '.join(SCHEDULES)} in teams of {SIZES} at rest")
+    return found
+
+
+def ages(levels: Sequence[Result]) -> dict[str, float]:
+    """Return each schedule's age, the mean over the team sizes [windows]."""
+    return {
+        name: mean(result.aoi_mean for result in levels if result.policy == name)
+        for name in SCHEDULES
+    }
+
+
+def caption(levels: Sequence[Result]) -> str:
+    """Return the missions and the commits of the curve and of the levels."""
+    first = levels[0]
+    return (
+        f"Curve: {TRAINED}. "
+        f"Levels: {first.episodes} missions a size from seed {first.seed}, commit {first.commit}"
+    )
 
 
 if __name__ == "__main__":

@@ -4,8 +4,8 @@
 
 Trains one network on teams at rest and one on walking teams, half an hour each on one core, and
 goes on with runs that have begun. Then flies both beside TDMA and spatial TDMA on missions that
-neither has seen. The one trained at rest cost less in six of seven regimes: it is
-`assets/policies/gnn.safetensors`, with its card beside it.
+neither has seen. The one trained at rest was chosen: it is `assets/policies/gnn.safetensors`, with
+its card beside it. Its learning curve is `training/results/learning/rest-curve.csv`.
 """
 
 import sys
@@ -21,7 +21,7 @@ from swarm_mj.system.reading import read_file
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 ROOT = Path(__file__).resolve().parent.parent
-RESULTS = ROOT / "training" / "results" / "learning"
+RESULTS = ROOT / "runs" / "candidates"
 CANDIDATES = {
     "rest": "--task stationary --robots 20 40 80",
     "walk": "--task random-walk --robots 10 20 40 80",
@@ -53,7 +53,7 @@ class ShippedGnn:
         RESULTS,
         "where curves and evaluations go",
         metavar="DIR",
-        shown="training/results/learning",
+        shown="runs/candidates",
     )
     jobs: int = setting(2, "processes of the comparison", low=1, high=256)
 

@@ -1,6 +1,7 @@
 """What every face is made of: rewards by hand, masks, and what is refused."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -34,6 +35,18 @@ def test_eq10_eq17_rewards_are_minus_the_mean_age_and_the_variance_of_velocities
             velocity = flocks.swarm.states.velocity_mps[b]
             squares = [(each - each.mean()) ** 2 for each in velocity.T]
             assert of_variance[b] == pytest.approx([-np.sum(squares) / 5] * 5, rel=1e-12)
+
+
+@pytest.mark.parametrize(("num_robots", "num_windows"), [(10, 500), (5, 100)])
+def test_a_silent_team_scores_what_the_docs_say(num_robots, num_windows):
+    batch = begun("stationary", num_robots=num_robots, num_windows=num_windows)
+    silence = np.tile(np.arange(num_robots), (2, 1))
+    rewards = [batch.step(silence) for _ in range(num_windows)]
+    score = -(1 - 1 / num_robots) * (num_windows + 1) / 2
+    assert np.mean(rewards, axis=(0, 2)) == pytest.approx([score] * 2, rel=1e-12)
+    page = Path(__file__).parents[2] / "docs" / "environments.md"
+    text = " ".join(page.read_text(encoding="utf-8").split())
+    assert f"{score:g} for {num_robots} robots and {num_windows} windows" in text
 
 
 @pytest.mark.parametrize("controller", [None, "added_tasks:Coverage"])
