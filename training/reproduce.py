@@ -147,7 +147,7 @@ class Work:
     def trainings(self) -> dict[str, list[str]]:
         """The arguments of `swarm-mj` that begin each training."""
         return {
-            name: ["train", *self._options(name), "--out", str(self.folder / name)]
+            name: ["train", *self._options(name), "--out", _from_here(self.folder / name)]
             for name in self.experiment.trainings
         }
 
@@ -268,6 +268,11 @@ class Work:
                 for curve in curves[name]:
                     baseline = paths[result.baseline]
                     yield replace(result, policy=curve, baseline=baseline, config=config)
+
+
+def _from_here(path: Path) -> str:
+    """Return a path from the current folder if it is in it: the policy's card keeps it."""
+    return str(path.relative_to(Path.cwd()) if path.is_relative_to(Path.cwd()) else path)
 
 
 def _is_current(path: Path) -> bool:
