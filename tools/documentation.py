@@ -151,7 +151,8 @@ def names_of(page: str) -> list[str]:
 def home_of(name: str) -> str:
     """Return a name by the module in which it is defined, where `swarm_mj` itself has it, too."""
     found = getattr(swarm_mj, name.removeprefix("swarm_mj."), None)
-    return f"{found.__module__}.{found.__qualname__}" if hasattr(found, "__qualname__") else name
+    own = getattr(found, "__qualname__", None)
+    return f"{getattr(found, '__module__', '')}.{own}" if own else name
 
 
 MAP_INTRODUCTION = """# From the paper to the code
