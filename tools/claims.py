@@ -21,7 +21,6 @@ GNNS = ["GNN", "GNN, seed 2", "GNN, seed 3"]
 RANGE_RATIOS = (0.2, 0.25, 0.5, 0.75, 1.0)
 VELOCITY_RATIOS = (0.15, 0.25, 0.325, 0.5)
 INFORMED = ("planner", "planner --payload none", "greedy-oracle")
-REWARDS = {"age": "the age", "variance": "the velocity variance"}  # by a training's name
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,33 +103,6 @@ def rank_correlation(rows: Sequence[Row]) -> float:
     )
     found = cast(Any, spearmanr(ages, variances))  # stubs have an empty class
     return float(found.statistic)
-
-
-def stability(_folder: Path, trained: Path = TRAINED) -> str:
-    """Return both costs of held-out missions at the beginning and at the end of each training."""
-    rows = [
-        [
-            "trained on",
-            "seed",
-            "age at first",
-            "at the end",
-            "velocity variance at first",
-            "at the end",
-        ]
-    ]
-    curves = _table(trained / "stability" / "curves.csv")
-    for name in dict.fromkeys(row["training"] for row in curves):
-        reward, _, seed = name.partition("-")
-        if reward in REWARDS:
-            first, *_, last = (row for row in curves if row["training"] == name)
-            ages = [f"{float(row['aoi']):.1f}" for row in (first, last)]
-            variances = [f"{float(row['velocity_variance']):.2f}" for row in (first, last)]
-            rows.append([REWARDS[reward], seed, *ages, *variances])
-    commits = _listed(row["commit"] for row in _table(trained / "stability" / "trainings.csv"))
-    return (
-        f"{_markdown(rows)}\n\n*From `training/reproduce/quick/stability/curves.csv`; commit "
-        f"{commits}. `make reproduce` trains them again.*"
-    )
 
 
 def trainings(_folder: Path, trained: Path = TRAINED) -> str:

@@ -37,7 +37,7 @@ from swarm_mj.system.reading import read_file, read_json, read_rows
 from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
-PAPERS = ("fig3", "fig6", "fig5", "fig4", "stability")
+PAPERS = ("fig3", "fig6", "fig5", "fig4")
 FIGURES = (*PAPERS, "tutorial")  # of docs/training.md
 SCALES = ("quick", "full")
 BEGUN = "begun.json"  # what a figure's runs were begun with

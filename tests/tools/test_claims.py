@@ -104,29 +104,6 @@ def test_correlations_with_and_without_those_who_know_more(folder):
     assert others == ["without `planner` and `greedy-oracle` (3)", *["1.00"] * 4]
 
 
-def test_stability_has_the_first_and_the_last_row_of_each_training(trained, tmp_path):
-    curves = [
-        {"training": name, "decisions": decisions, "aoi": aoi, "velocity_variance": variance}
-        for name, decisions, aoi, variance in (
-            ("age-1", 0.0, 11.56, 0.088),
-            ("age-1", 5120.0, 99.0, 9.0),
-            ("age-1", 40064.0, 10.14, 0.081),
-            ("variance-2", 0.0, 11.56, 0.088),
-            ("variance-2", 40064.0, 56.6, 0.441),
-            ("credit", 0.0, 50.0, 1.0),
-            ("credit", 40064.0, 30.0, 1.0),
-        )
-    ]
-    trained("stability", "curves", curves)
-    trained("stability", "trainings", [{"training": "age-1", "commit": "abc123"}])
-    text = claims.stability(tmp_path, tmp_path)
-    assert cells(text) == [
-        ["the age", "1", "11.6", "10.1", "0.09", "0.08"],
-        ["the velocity variance", "2", "11.6", "56.6", "0.09", "0.44"],
-    ]
-    assert "commit abc123." in text
-
-
 def test_trainings_are_counted_by_figure(trained, tmp_path):
     for figure, decisions in (("fig4", (40448, 60416)), ("fig6", (40448,))):
         rows = [
