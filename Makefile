@@ -143,7 +143,8 @@ format: $(DEV)
 PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN generalized from 0.25" \
   "GNN trained at each size" "GNN generalized from 40" \
   "GNN trained on AoI" "GNN trained on velocity variance"
-OURS := planner "planner --payload none" gnn spatial-tdma tdma gossip aloha random-flooding greedy-oracle
+OURS := planner "planner --payload none" sotdma age-gain-csma gnn spatial-tdma tdma gossip csma aloha random-flooding \
+  greedy-oracle
 
 # STUDIES="city channels" flies these tables only; an interrupted run continues.
 results: setup

@@ -33,7 +33,7 @@ SEARCHED, PLANNER = "training.ceiling:Annealed", "planner --payload none"
 FIGURE = RESULT_FIGURES["fig4"]
 METHODS = (
     *("planner", "planner --payload none", "gnn", "spatial-tdma", "tdma", "gossip", "aloha"),
-    *("random-flooding", SEARCHED),
+    *("random-flooding", "sotdma", "age-gain-csma"),
 )
 
 
@@ -54,9 +54,9 @@ class LimitsFigure:
         """Draw the figure; return the exit code."""
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
-        files = [self.results / f"{name}.csv" for name in ("paper-stationary", "ceiling")]
         figure = draw_limits(
-            [result for file in files for result in read_results(file)],
+            read_results(self.results / "paper-stationary.csv"),
+            read_results(self.results / "ceiling.csv"),
             *read_floor(self.results / "floor.csv"),
         )
         for path in paths:
@@ -154,11 +154,18 @@ def _markdown(rows: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(row)} |" for row in rows)
 
 
-def draw_limits(results: Sequence[Result], floor: Curve, made_by: str) -> Figure:
-    """Draw the policies' curves above the floor; its commit stands below with theirs."""
+def draw_limits(
+    results: Sequence[Result], searched: Sequence[Result], floor: Curve, made_by: str
+) -> Figure:
+    """Draw the policies' curves between the searched schedule and the floor, of fewer missions.
+
+    The floor's commit stands below with theirs.
+    """
     found = [result for result in results_of(FIGURE, results) if result.policy in METHODS]
     (panel,) = FIGURE.panels
     shown = [curve for curve in curves(FIGURE, panel.cost, found) if curve.method in METHODS]
+    ceiling = curves(FIGURE, panel.cost, results_of(FIGURE, searched))
+    shown += [curve for curve in ceiling if curve.method == SEARCHED]
     return draw_curves(FIGURE, [*found, replace(found[0], commit=made_by)], [[*shown, floor]])
 
 

@@ -24,7 +24,7 @@ from swarm_mj.system.fields import setting
 from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
-POLICIES = ("planner", "gnn", "tdma", "random-flooding")
+POLICIES = ("planner", "sotdma", "age-gain-csma", "gnn", "tdma", "random-flooding")
 PUBLISHED = ("GNN trained at each size", "GNN generalized from 40")
 
 

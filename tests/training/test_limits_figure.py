@@ -36,9 +36,10 @@ def test_the_floor_is_named_under_the_policies_and_its_commit_stands_below(floor
     floor.write_text(floor.read_text() + "0.5,1.2,abcdef012345\n")
     base = replace(result("tdma"), task="stationary", num_robots=40)
     rows = [replace(base, range_ratio=x, aoi_mean=9.0) for x in (0.25, 0.5)]
-    figure = draw_limits(rows, *read_floor(floor))
+    searched = replace(rows[0], policy="training.ceiling:Annealed", episodes=3)  # fewer
+    figure = draw_limits(rows, [searched], *read_floor(floor))
     texts = {text.get_text() for text in figure.findobj(lambda a: hasattr(a, "get_text"))}
-    assert {"TDMA", "proven floor"} <= texts
+    assert {"TDMA", "proven floor", "searched schedule"} <= texts
     assert any("abcdef0" in text for text in texts)
 
 
