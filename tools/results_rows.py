@@ -14,6 +14,7 @@ Row = dict[str, Any]
 Rows = list[Row]
 PAPER = "published"  # in place of a file: the paper's own points
 MISSIONS = ("episodes", "seed")
+BY_HAND = ("speed",)  # which `make results` does not make: it needs the authors' environment
 
 
 def read(names: Iterable[str], folder: Path) -> Rows:
@@ -82,11 +83,10 @@ def origin(rows: Sequence[Row]) -> str:
         [missions] = {_missions(row) for row in ours if row["results"] == name}
         said.append(f"`{name}`{missions}")
     commits = " and ".join(sorted({str(row["commit"]) for row in ours}))
-    studies = " ".join(dict.fromkeys(map(study_of, (row["results"] for row in ours))))
-    return (
-        f'*From {", ".join(said)}; commit {commits}. `make results STUDIES="{studies}"` flies '
-        "them again.*"
-    )
+    named = dict.fromkeys(row["results"] for row in ours if row["results"] not in BY_HAND)
+    studies = " ".join(dict.fromkeys(map(study_of, named)))
+    again = f' `make results STUDIES="{studies}"` flies them again.' if studies else ""
+    return f"*From {', '.join(said)}; commit {commits}.{again}*"
 
 
 def study_of(results: str) -> str:
