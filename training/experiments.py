@@ -1,13 +1,53 @@
-"""What `reproduce.py` trains and flies for a figure: the form of the files in `reproduce/`."""
+"""What `reproduce.py` trains and flies: its settings, and the form of the files in `reproduce/`."""
 
 import shlex
 import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
+from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_file, read_plain
 
 MOST_BYTES = 10_000_000  # of a file that is read
+ROOT = Path(__file__).resolve().parent.parent
+PAPERS = ("fig3", "fig6", "fig5", "fig4")
+FIGURES = (*PAPERS, "tutorial")  # of docs/training.md
+SCALES = ("quick", "full")
+
+
+@dataclass(frozen=True, kw_only=True)
+class Settings:
+    """How much is made, of what, and where everything goes."""
+
+    scale: str = setting("quick", "how much is trained and flown", choices=SCALES)
+    figures: tuple[str, ...] = setting(FIGURES, "which figures", choices=FIGURES)
+    experiments: Path = setting(
+        ROOT / "training" / "reproduce",
+        "what is trained and flown for each figure",
+        metavar="DIR",
+        shown="training/reproduce",
+    )
+    results: Path = setting(
+        ROOT / "training" / "results" / "reproduce",
+        "where results go, in a folder of the scale",
+        metavar="DIR",
+        shown="training/results/reproduce",
+    )
+    policies: Path = setting(
+        ROOT / "training" / "reproduce",
+        "where trained policies go, in folders of the scale and the figure",
+        metavar="DIR",
+        shown="training/reproduce",
+    )
+    fly: str = setting("", "options of swarm-mj evaluate that override the file's")
+    runs: Path = setting(
+        ROOT / "runs" / "reproduce",
+        "where runs are kept, to go on with",
+        metavar="DIR",
+        shown="runs/reproduce",
+    )
+    jobs: int = setting(1, "processes that fly", low=1, high=256)
+    force: bool = setting(False, "make everything again")
 
 
 @dataclass(frozen=True, kw_only=True)

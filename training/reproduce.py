@@ -21,7 +21,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from experiments import MOST_BYTES, Experiment, Scale, read_experiment, typed
+from experiments import MOST_BYTES, Experiment, Scale, Settings, read_experiment, typed
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import parse, script
@@ -31,15 +31,10 @@ from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system import writing
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import setting
 from swarm_mj.system.packages import code_digest, commit
 from swarm_mj.system.reading import read_file, read_json, read_rows
 from swarm_mj.system.writing import Output, check_outputs
 
-ROOT = Path(__file__).resolve().parent.parent
-PAPERS = ("fig3", "fig6", "fig5", "fig4")
-FIGURES = (*PAPERS, "tutorial")  # of docs/training.md
-SCALES = ("quick", "full")
 BEGUN = "begun.json"  # what a figure's runs were begun with
 CURVE_COLUMNS = (
     "training", "decisions", "minutes", "aoi", "aoi_sem", "velocity_variance",
@@ -49,41 +44,6 @@ TRAINING_COLUMNS = (
     "training", "options", "decisions", "minutes", "best_decisions", "commit", "experiment",
     "settings",
 )  # fmt: skip
-
-
-@dataclass(frozen=True, kw_only=True)
-class Settings:
-    """How much is made, of what, and where everything goes."""
-
-    scale: str = setting("quick", "how much is trained and flown", choices=SCALES)
-    figures: tuple[str, ...] = setting(FIGURES, "which figures", choices=FIGURES)
-    experiments: Path = setting(
-        ROOT / "training" / "reproduce",
-        "what is trained and flown for each figure",
-        metavar="DIR",
-        shown="training/reproduce",
-    )
-    results: Path = setting(
-        ROOT / "training" / "results" / "reproduce",
-        "where results go, in a folder of the scale",
-        metavar="DIR",
-        shown="training/results/reproduce",
-    )
-    policies: Path = setting(
-        ROOT / "training" / "reproduce",
-        "where trained policies go, in folders of the scale and the figure",
-        metavar="DIR",
-        shown="training/reproduce",
-    )
-    fly: str = setting("", "options of swarm-mj evaluate that override the file's")
-    runs: Path = setting(
-        ROOT / "runs" / "reproduce",
-        "where runs are kept, to go on with",
-        metavar="DIR",
-        shown="runs/reproduce",
-    )
-    jobs: int = setting(1, "processes that fly", low=1, high=256)
-    force: bool = setting(False, "make everything again")
 
 
 class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt

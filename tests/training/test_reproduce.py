@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 import reproduce as program
+from experiments import FIGURES, PAPERS
 from synthetic import result
 
 from swarm_mj.cli import parse
@@ -234,7 +235,7 @@ def test_an_experiment_flies_all_points_of_its_figure(figure):
         assert {each["network.receptive_field"] for each in hops} == set(shown.xs)
 
 
-@pytest.mark.parametrize("figure", program.PAPERS)
+@pytest.mark.parametrize("figure", PAPERS)
 def test_full_has_the_authors_budget_and_never_stops_before(figure):
     work = program.read_work(figure, program.Settings(scale="full"))
     options = parse(next(iter(work.trainings.values())))[1]
@@ -243,7 +244,7 @@ def test_full_has_the_authors_budget_and_never_stops_before(figure):
     parse(work.flights[0][1])
 
 
-@pytest.mark.parametrize("figure", program.FIGURES)
+@pytest.mark.parametrize("figure", FIGURES)
 def test_committed_policies_are_of_the_experiment_as_it_stands(figure):
     work = program.read_work(figure, program.Settings())
     assert work.is_trained, "make reproduce trains them anew"
