@@ -40,7 +40,8 @@ PUBLISHED = (
     " ({{published_{0}_mean:{1}}} ± {{published_{0}_sem:{1}}})"  # after what it is compared to
 )
 COSTS = (("aoi", ".1f"), ("velocity_variance", ".3f"))  # that the paper published, and their digits
-OWN = ("head", "results", "form", "fact")  # keys of a row or a column that no result has
+FACTS = ("payload", "uses", "beyond_paper")  # that a row may say itself
+OWN = ("head", "results", "form", "fact", *FACTS)  # keys of a row or a column that no result has
 sys.path.append(str(ROOT / "training"))  # where the modules are that make tables
 
 
