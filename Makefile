@@ -18,7 +18,7 @@ help:
 	@echo "make test    set up if needed and run the tests, each law once"
 	@echo "make test-all  run the long tests, too: many seeds, a built wheel, the site"
 	@echo "make test-engines  try studies on a Ray cluster and on SLURM's stand-in; installs 0.3 GB"
-	@echo "make attack  run the fault tests for ten minutes and count what held"
+	@echo "make attack  run the fault tests for minutes, and count what held"
 	@echo "make reference  ask the network simulator ns-3 again (Linux on x86-64, with g++)"
 	@echo "make check   formatter, linter and type checker"
 	@echo "make format  let the formatter and the linter mend what they can"
@@ -139,7 +139,7 @@ format: $(DEV)
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-# The paper's methods beside two of ours, and ours beside the paper's simplest.
+# The paper's methods with two of ours, and ours with the paper's simplest.
 PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN generalized from 0.25" \
   "GNN trained at each size" "GNN generalized from 40" \
   "GNN trained on AoI" "GNN trained on velocity variance"

@@ -7,7 +7,8 @@
 Each file of `training/studies/` is a study, flown as `swarm-mj study run` does. `gnn` flies the
 trained policies of `reproduce.py`; `deciding` runs `swarm-mj bench`. Each leaves a
 table of its name in `training/results/`: `NAME.csv` has a row for each policy and regime,
-`NAME.parquet` one for each mission. What is there of this commit is kept; `--force` flies it again.
+`NAME.parquet` one for each mission. What is there of this commit is kept; `--force` flies it again,
+but for `gnn`: there `reproduce.py --force` does, and trains anew.
 An interrupted run continues where it broke off. Then `tools/results_table.py` writes the numbers
 into the docs, and `make figures` draws them.
 """
