@@ -56,6 +56,7 @@ $(READY): pyproject.toml tools/constraints.txt tools/hashes-uv.txt tools/hashes.
 	@$(PIP) --constraint tools/constraints.txt torch
 	@$(PIP) --no-deps --no-build-isolation --editable .
 	@touch $@
+	@echo "Done. make fly flies a mission; after 'source .venv/bin/activate', swarm-mj --help says what else there is."
 
 # What the tests, the checks and the documentation need on top.
 $(DEV): $(READY) tools/hashes-dev.txt
@@ -149,7 +150,9 @@ OURS := planner "planner --payload none" sotdma age-gain-csma gnn spatial-tdma t
 # STUDIES="city channels" flies these tables only; an interrupted run continues.
 results: setup
 	$(BIN)/python training/results.py --scale $(SCALE) $(if $(STUDIES),--studies $(STUDIES)) $(ARGS)
-ifeq ($(SCALE),smoke)
+ifneq ($(STUDIES),)
+	@echo "These tables are there. make results flies what is missing, then fills the docs and draws the figures."
+else ifeq ($(SCALE),smoke)
 	$(BIN)/python tools/results_table.py --structure --results runs/smoke
 else
 	$(BIN)/python tools/results_table.py

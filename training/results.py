@@ -131,6 +131,8 @@ def fly_gnn(settings: Settings) -> int:
     """Fly the policies that `reproduce.py` trained; return the exit code."""
     usual = reproduce.Settings(jobs=settings.jobs)
     if not settings.is_smoke:
+        for path in (usual.results / usual.scale).glob("*.csv") if settings.force else ():
+            path.unlink()
         return reproduce.run(usual)
     few = f"--episodes {MISSIONS} --windows {WINDOWS}"
     return reproduce.run(replace(usual, fly=few, results=settings.folder / "reproduce"))
@@ -171,7 +173,9 @@ def is_current(path: Path) -> bool:
 
 def run(settings: Settings) -> int:
     """Fly what is missing; return the exit code."""
-    check_outputs(*(Output("results", settings.folder / f"{each}.csv") for each in STUDIES))
+    check_outputs(
+        *(Output("results", settings.folder / f"{each}.csv") for each in settings.studies)
+    )
     for number, name in enumerate(settings.studies, start=1):
         if not settings.force and is_current(settings.folder / f"{name}.csv"):
             say(f"{name}: {settings.folder / name}.csv is there; --force flies it again")
@@ -180,6 +184,7 @@ def run(settings: Settings) -> int:
         with chdir(ROOT):
             code = FLOWN_BY[name](settings) if name in OTHERS else fly_study(settings, name)
         if code != DONE:
+            say("The same command continues here.")
             return code
     return DONE
 
