@@ -31,7 +31,7 @@ def table():
     text = (ROOT / "README.md").read_text()
     for name in LABELS:
         (row,) = re.findall(rf"^\| `{name}`.*$", text, re.MULTILINE)
-        yield name, [float(number) for number in re.findall(r"([\d.]+) ± ", row)][1:4]
+        yield name, [float(number) for number in re.findall(r"\| ([\d.]+) ± ", row)][1:4]
 
 
 def test_the_chart_has_the_lines_of_the_table_and_their_numbers(axes):
