@@ -77,7 +77,7 @@ class Settings:
     def folder(self) -> Path:
         """Where tables go."""
         usual = ROOT / "runs" / "smoke" if self.is_smoke else ROOT / "training" / "results"
-        return (self.results or usual).resolve()
+        return (self.results or usual).absolute()
 
     @property
     def drafts(self) -> Path:
@@ -100,7 +100,7 @@ def fly_study(settings: Settings, name: str) -> int:
     """Fly a study, or the rest of it; return the exit code."""
     study = study_of(name)
     study = smoked(study) if settings.is_smoke else study
-    drafts = [settings.drafts.resolve() / f"{name}{kind}" for kind in KINDS]
+    drafts = [settings.drafts.absolute() / f"{name}{kind}" for kind in KINDS]
     targets = [settings.folder / draft.name for draft in drafts]
     say(f"{name}: {study.num_missions:,} missions")
     how = {"jobs": settings.jobs, "resume": not settings.force, "force": settings.force}
