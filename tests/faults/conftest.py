@@ -42,7 +42,9 @@ def tries(record_property):
 
 
 def pytest_terminal_summary(terminalreporter):
-    """Prints a line for each class: tried and held."""
+    """Prints a line for each class: tried and held. Workers have counted only their own tests."""
+    if hasattr(terminalreporter.config, "workerinput"):
+        return
     tried, held = Counter(), Counter()
     for outcome in ("passed", "failed"):
         for report in terminalreporter.stats.get(outcome, []):
