@@ -60,7 +60,7 @@ def test_the_results_are_the_papers_missions_tuned_as_the_authors_did():
     assert Counter(result.policy for result in OURS) == dict.fromkeys(BASELINES, 14)
     tuned = {row.probability for row in read_table(TABLE) if row.preset == "reference"}
     for result in OURS:
-        assert result.episodes == 50
+        assert result.episodes == 100
         assert result.num_windows == 500
         assert json.loads(result.config)["preset"] == "reference"
         if result.policy != "round-robin":

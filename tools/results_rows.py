@@ -14,7 +14,7 @@ Row = dict[str, Any]
 Rows = list[Row]
 PAPER = "published"  # in place of a file: the paper's own points
 MISSIONS = ("episodes", "seed")
-BY_HAND = ("speed",)  # which `make results` does not make: it needs the authors' environment
+NOT_FLOWN = ("speed", "attack")  # not by `make results`: they need the authors' environment, `make attack`
 COMMITTED = Path(__file__).resolve().parent.parent / "training" / "results"
 
 
@@ -27,7 +27,7 @@ def read(names: Iterable[str], folder: Path) -> Rows:
 def _rows(name: str, folder: Path) -> Rows:
     if name == PAPER:
         return _published()
-    folder = COMMITTED if name in BY_HAND else folder  # a smoke test has none of its own
+    folder = COMMITTED if name in NOT_FLOWN else folder  # a smoke test has none of its own
     with (folder / f"{name}.csv").open(newline="", encoding="utf-8") as file:
         return [_row(name, row) for row in csv.DictReader(file)]
 
@@ -85,7 +85,7 @@ def origin(rows: Sequence[Row]) -> str:
         [missions] = {_missions(row) for row in ours if row["results"] == name}
         said.append(f"`{name}`{missions}")
     commits = " and ".join(sorted({str(row["commit"]) for row in ours}))
-    named = dict.fromkeys(row["results"] for row in ours if row["results"] not in BY_HAND)
+    named = dict.fromkeys(row["results"] for row in ours if row["results"] not in NOT_FLOWN)
     studies = " ".join(dict.fromkeys(map(study_of, named)))
     again = f' `make results STUDIES="{studies}"` flies them again.' if studies else ""
     return f"*From {', '.join(said)}; commit {commits}.{again}*"

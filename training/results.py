@@ -116,7 +116,7 @@ def fly_study(settings: Settings, name: str) -> int:
 def fly_floor(settings: Settings) -> int:
     """Compute the floor of `docs/bounds.md`; return the exit code."""
     usual = bounds.Settings(out=settings.folder / "floor.csv")
-    return bounds.run(replace(usual, teams=1, seconds=0.1) if settings.is_smoke else usual)
+    return bounds.run(replace(usual, teams=MISSIONS, seconds=0.1) if settings.is_smoke else usual)
 
 
 def fly_converging(settings: Settings) -> int:

@@ -3,9 +3,13 @@
 import csv
 import re
 from pathlib import Path
+from shutil import copytree, ignore_patterns
 
 import pytest
-from results_table import MARKER, PAGES, numbers
+from results_rows import NOT_FLOWN
+from results_table import MARKER, PAGES, main, numbers
+
+from swarm_mj.system.exit_codes import DONE
 
 ROOT = Path(__file__).parents[2]
 RESULTS = ROOT / "training" / "results"
@@ -54,3 +58,10 @@ def test_all_results_are_of_one_clean_commit():
                     commits.setdefault(row["commit"], set()).add(path.name)
     assert len(commits) == 1, commits
     assert re.fullmatch("[0-9a-f]{12}", *commits)
+
+
+def test_the_tables_can_be_made_from_what_make_results_makes(tmp_path):
+    made = copytree(
+        RESULTS, tmp_path / "made", ignore=ignore_patterns(*(f"{x}.*" for x in NOT_FLOWN))
+    )
+    assert main(["--structure", "--results", str(made)]) == DONE
