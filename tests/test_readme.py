@@ -30,7 +30,7 @@ REASONS = {
     "takes minutes": "train",
     "needs SLURM": "slurm",
 }
-LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml"}
+LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml", "toml"}
 # Commands run as they are written, but for less long: what comes last on a line counts.
 CUT_SHORT = {
     "bench": "--seconds 0.1 --missions 1 --episodes 0 --no-learning",
@@ -40,9 +40,9 @@ CUT_SHORT = {
     "train": "--budget 40 --robots 5 --windows 10 --held-out 1",
     "train --resume": "--budget 80",
 }
-ONLY_PARSED = re.compile("--minutes 30|study run impairments")  # the page trains less before
+ONLY_PARSED = re.compile("--minutes 30")  # the page trains less before
 # A block that is a file says so in line 1.
-FILE = re.compile(r"^(?:# (?P<program>[a-z_]+\.py)|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
+FILE = re.compile(r"^(?:# (?P<program>[a-z_]+\.(?:py|toml))|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
 
 
 class Block(NamedTuple):
@@ -62,7 +62,7 @@ BLOCKS = [
 RUN = {
     page: list(blocks)
     for page, blocks in groupby(
-        (b for b in BLOCKS if b.language in ("python", "sh", "xml") and not b.reason),
+        (b for b in BLOCKS if b.language in ("python", "sh", "xml", "toml") and not b.reason),
         lambda b: b.page,
     )
 }
