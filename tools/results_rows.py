@@ -14,7 +14,7 @@ Row = dict[str, Any]
 Rows = list[Row]
 PAPER = "published"  # in place of a file: the paper's own points
 MISSIONS = ("episodes", "seed")
-NOT_FLOWN = ("speed", "attack")  # not by `make results`: they need the authors' environment, `make attack`
+NOT_FLOWN = ("speed", "attack")  # `make results` does not: docs/results.md says how they are made
 COMMITTED = Path(__file__).resolve().parent.parent / "training" / "results"
 
 
