@@ -38,8 +38,9 @@ class Parser(argparse.ArgumentParser):
             for group in self._action_groups
             if group._group_actions and set(group._group_actions) <= self.rare.keys()
         ]
-        left_out = f"{self.prog} --help-all shows {len(self.rare)} more: {', '.join(titles)}"
-        return f"{super().format_help()}\n{left_out}\n"
+        left_out = f"{self.prog} --help-all shows {len(self.rare)} more"
+        named = f": {', '.join(titles)}" if titles else ""
+        return f"{super().format_help()}\n{left_out}{named}\n"
 
     def known(self, arguments: Sequence[str]) -> argparse.Namespace:
         """Return the values typed; refuse an unknown flag and name the likely one."""
