@@ -170,6 +170,7 @@ class Run:
         here; it says what to install.
         """
         if not is_notebook():
+            self.footage()  # says if there is none
             terminal.plain_console().print(ELSEWHERE)
             return
         content = self._film(".mp4")

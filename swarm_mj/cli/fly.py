@@ -39,7 +39,7 @@ class FlyOptions(PolicyOptions):
 
     EPILOG: ClassVar = EPILOGS["fly"]
     policy: str = common_setting(
-        "planner", f"{NAMES}, a directory with a learned policy, or module:Name of your own"
+        "planner", f"{NAMES}, a learned policy's directory or file, or module:Name of your own"
     )
     seed: int = common_setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()

@@ -6,6 +6,7 @@ the last of `--robots 10 --robots 20`.
 
 import argparse
 import sys
+import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
 from dataclasses import MISSING, Field, field, fields
@@ -70,6 +71,10 @@ class _HelpAll(argparse.Action):  # with the options that most people do not nee
 
 
 class _Formatter(argparse.HelpFormatter):
+    def _split_lines(self, text: str, width: int) -> list[str]:
+        """Return lines in which names of policies stay whole."""
+        return textwrap.wrap(" ".join(text.split()), width, break_on_hyphens=False)
+
     def _format_action_invocation(self, action: argparse.Action) -> str:
         """Return a flag without those that it had in earlier releases."""
         shown = copy(action)

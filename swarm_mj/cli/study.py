@@ -27,7 +27,9 @@ class StudyOptions(StudyFlags):
     """The options of `swarm-mj study`."""
 
     EPILOG: ClassVar = f"{EPILOGS['study']} {StudyFlags.EPILOG}"
-    action: str = setting(help="run or compare", choices=tuple(TAKES), is_positional=True)
+    action: str = setting(
+        help="what to do", metavar="ACTION", choices=tuple(TAKES), is_positional=True
+    )
     named: tuple[str, ...] = setting(
         help=OPTIONS["study"]["named"], metavar="FILE", is_positional=True
     )
@@ -49,7 +51,8 @@ def run(options: StudyOptions) -> int:
     for cost in ("aoi", "task_cost"):
         rows = compared(before, after, cost)
         table = rows.to_string(index=False, na_rep="-", float_format="{:.3g}".format)
-        plain_console().print(f"{cost}, means over missions, with 95 % intervals\n{table}\n")
+        if len(rows):  # tasks without a cost have none
+            plain_console().print(f"{cost}, means over missions, with 95 % intervals\n{table}\n")
     return DONE
 
 
@@ -60,8 +63,9 @@ def read_study(name: str) -> Study:
     if path.suffix != ".toml":
         hint = did_you_mean(name, shipped) or f"; these are shipped: {', '.join(sorted(shipped))}"
         raise ValueError(f"a study must be named FILE.toml, not {name}{hint}")
+    content = read_file(path, "study", MAX_BYTES)
     try:
-        return _study(tomllib.loads(read_file(path, "study", MAX_BYTES).decode()))
+        return _study(tomllib.loads(content.decode()))
     except (ValueError, TypeError) as error:
         raise ValueError(f"study {path}: {error}") from error
 

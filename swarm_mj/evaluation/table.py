@@ -59,7 +59,7 @@ def missions_of(result: Result) -> str:
         "scene": result.scene,
         "bit rate": None if result.bit_rate is None else bits_per_second(result.bit_rate),
         "arena": None if result.arena == OPEN else result.arena,
-        "known": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
+        "prior knowledge": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
     }
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
     fates = ", robots collide" if config_of(result).get("collide") else ""

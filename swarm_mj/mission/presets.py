@@ -90,7 +90,7 @@ def where_flown(mission: Mission) -> list[str]:
     if radio != radio_in_words(usual):
         where.append(radio or "free space")
     if mission.prior_knowledge != NOTHING:
-        where.append(f"known {mission.prior_knowledge}")
+        where.append(f"prior knowledge {mission.prior_knowledge}")
     if mission.bit_rate is not None:
         where.append(bits_per_second(mission.bit_rate))
     return where

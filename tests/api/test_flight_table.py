@@ -147,7 +147,8 @@ def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
         (paper("random-walk", collide=True), "random-walk, tdma, 40 robots that collide, seed 3"),
         (
             paper("random-walk", arena="blocks", fading="rayleigh", prior_knowledge="map"),
-            "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, known map",
+            "random-walk, tdma, 40 robots, seed 3, arena blocks, fading rayleigh, "
+            "prior knowledge map",
         ),
         (paper("flocking", bit_rate=250e3), "flocking, tdma, 40 robots, seed 3, 250 kbit/s"),
         (PRESETS["urban"](), "random-walk, tdma, 40 robots, seed 3, preset urban"),

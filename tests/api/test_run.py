@@ -118,13 +118,15 @@ def test_a_notebook_plays_it(monkeypatch):
     assert video.mimetype == "video/mp4"
 
 
-def test_elsewhere_nothing_opens_and_what_was_not_recorded_cannot_be_shown(
-    unrecorded, monkeypatch, capsys
-):
+def test_elsewhere_nothing_opens(run, monkeypatch, capsys):
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: None))
-    unrecorded.show()
+    run.show()
     assert "run.save('flight.mp4') writes the video" in capsys.readouterr().out
-    monkeypatch.setattr("swarm_mj.api.run.is_notebook", lambda: True)
+
+
+@pytest.mark.parametrize("is_notebook", [False, True])
+def test_what_was_not_recorded_cannot_be_shown(is_notebook, unrecorded, monkeypatch):
+    monkeypatch.setattr("swarm_mj.api.run.is_notebook", lambda: is_notebook)
     with pytest.raises(ValueError, match="fly with record=True"):
         unrecorded.show()
 

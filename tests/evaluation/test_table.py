@@ -185,7 +185,7 @@ def test_the_lower_bound_stands_below(printed):
         ({"bit_rate": 1e6}, ",\nbit rate 1 Mbit/s\n"),
         ({"arena": "blocks"}, ",\narena blocks\n"),
         ({"radio": "fading rayleigh"}, ",\nradio fading rayleigh\n"),
-        ({"prior_knowledge": "map,start"}, ",\nknown map,start\n"),
+        ({"prior_knowledge": "map,start"}, ",\nprior knowledge map,start\n"),
         ({"channel": "my:Radio"}, ",\nchannel my:Radio\n"),
     ],
 )
