@@ -40,7 +40,7 @@ CUT_SHORT = {
     "train": "--budget 40 --robots 5 --windows 10 --held-out 1",
     "train --resume": "--budget 80",
 }
-ONLY_PARSED = re.compile("--minutes 30")  # the page trains less before
+ONLY_PARSED = re.compile("--minutes 30|study run impairments")  # the page trains less before
 # A block that is a file says so in line 1.
 FILE = re.compile(r"^(?:# (?P<program>[a-z_]+\.(?:py|toml))|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
 
