@@ -100,8 +100,6 @@ def as_typed(value: object) -> str:
         return " ".join(map(as_typed, value))
     if value is None:
         return "none"
-    if isinstance(value, float) and value.is_integer():
-        return f"{value:.0f}"
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
