@@ -42,7 +42,7 @@ CUT_SHORT = {
 }
 ONLY_PARSED = re.compile("--minutes 30|study run impairments")  # the page trains less before
 # A block that is a file says so in line 1.
-FILE = re.compile(r"^(?:# (?P<program>[a-z_]+\.(?:py|toml))|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
+FILE = re.compile(r"^(?:# (?P<file>[a-z_]+\.(?:py|toml))|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
 
 
 class Block(NamedTuple):
@@ -105,7 +105,7 @@ def test_a_page_runs_from_top_to_bottom(page, page_folder, forks):
                 run_command(line, page_folder, forks)
             continue
         if file := FILE.match(block.code):
-            (page_folder / (file["program"] or file["scene"])).write_text(block.code)
+            (page_folder / (file["file"] or file["scene"])).write_text(block.code)
         if block.language == "python":
             exec(compile(block.code, page, "exec"), namespace)
 

@@ -11,7 +11,7 @@ from typing import IO, Any
 
 # A Python that runs nothing out of the folder one stands in, where a numpy.py may lie.
 PYTHON = (sys.executable, "-P")
-LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for half a minute
+LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for ten seconds
 # Reads until its pipe is closed: the kernel does so when the one who writes has ended.
 GUARD = """
 import os, signal, sys

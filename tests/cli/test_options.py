@@ -1,5 +1,6 @@
 """A dataclass as a command line, shown in small; every command's help fits and says all."""
 
+import re
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -7,6 +8,7 @@ import pytest
 
 from swarm_mj.cli import COMMANDS, main
 from swarm_mj.cli.options import parse_options
+from swarm_mj.policies.registry import POLICIES
 from swarm_mj.system.fields import setting
 
 
@@ -143,6 +145,15 @@ def test_the_help_of_the_large_commands_is_a_screen_or_so(capsys, command):
     assert lines[-1].startswith(f"swarm-mj {command} --help-all shows ")
     flags = [line for line in lines if line.startswith("  --")]
     assert len(flags) <= 16
+
+
+def test_help_breaks_no_name_and_names_only_groups_of_what_it_leaves_out(capsys):
+    assert main(["fly", "--help"]) == 0
+    assert {name for name in POLICIES if " " not in name} <= set(
+        re.split(r"[,\s]+", capsys.readouterr().out)
+    )
+    assert main(["study", "--help"]) == 0
+    assert capsys.readouterr().out.endswith("\nswarm-mj study --help-all shows 6 more\n")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -170,3 +170,11 @@ def test_missions_are_written_and_compared(succeed, tmp_path):
     assert [line.split()[0] for line in lines] == ["mst", "round-robin"]
     said = succeed("study", "compare", "a.parquet", "b.parquet").stdout
     assert "erasure" in said.splitlines()[1]
+
+
+def test_tasks_without_a_cost_are_compared_by_their_age_only(succeed, tmp_path):
+    (tmp_path / "s.toml").write_text(f"{SMALL}{MISSION}task = 'stationary'\n")
+    succeed("study", "run", "s.toml", "--parquet", "a.parquet")
+    said = succeed("study", "compare", "a.parquet", "a.parquet").stdout
+    firsts = [line.split()[0] for line in said.strip().splitlines()]
+    assert firsts == ["aoi,", "policy", "mst", "round-robin"]

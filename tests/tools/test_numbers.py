@@ -3,10 +3,10 @@
 import csv
 import re
 from pathlib import Path
-from shutil import copytree, ignore_patterns
+from shutil import copy, copytree
 
 import pytest
-from results_rows import NOT_FLOWN
+from results import OTHERS, STUDIES
 from results_table import MARKER, PAGES, main, numbers
 
 from swarm_mj.system.exit_codes import DONE
@@ -61,7 +61,8 @@ def test_all_results_are_of_one_clean_commit():
 
 
 def test_the_tables_can_be_made_from_what_make_results_makes(tmp_path):
-    made = copytree(
-        RESULTS, tmp_path / "made", ignore=ignore_patterns(*(f"{x}.*" for x in NOT_FLOWN))
-    )
-    assert main(["--structure", "--results", str(made)]) == DONE
+    for name in (*STUDIES, *OTHERS, "exact"):  # `floor` makes `exact`, too; `gnn` has a folder
+        if name != "gnn":
+            copy(RESULTS / f"{name}.csv", tmp_path)
+    copytree(RESULTS / "reproduce", tmp_path / "reproduce")
+    assert main(["--structure", "--results", str(tmp_path)]) == DONE

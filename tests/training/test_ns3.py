@@ -122,7 +122,7 @@ def test_the_page_has_the_numbers_of_the_recordings():
     authors = load("authors")
     is_addressed = authors["recipient"][:, :, None] == np.arange(20)
     while_sending = authors["decodes_if_silent"] & is_addressed & ~authors["decodes"]
-    assert f"{while_sending.sum()} of the packets decoded under the authors' preset" in section
+    assert f"{while_sending.sum()} of the packets decoded under `--preset reference`" in section
 
 
 @pytest.mark.parametrize("factor", [0.97, 1.03])

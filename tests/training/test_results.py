@@ -14,8 +14,10 @@ from swarm_mj.system.packages import commit
 
 ROOT = Path(__file__).parents[2]
 # Studies of fewer missions than the paper's 100: the whole must fly in three hours.
-SMALLER = {"ceiling", "elsewhere", "impairments", "position-noise"}
-SMALLER |= {"large-teams", "large-teams-small"}
+SMALLER = {
+    *("ceiling", "elsewhere", "impairments", "position-noise"),
+    *("large-teams", "large-teams-small"),
+}
 
 
 @pytest.fixture(autouse=True)
@@ -74,9 +76,9 @@ def test_every_study_can_be_read_and_says_its_missions(name):
     assert study.pairs
 
 
-@pytest.mark.parametrize("name", sorted(set(program.STUDIES) - SMALLER))
-def test_policies_fly_as_many_missions_as_the_papers(name):
-    assert program.study_of(name).episodes == 100
+def test_policies_fly_as_many_missions_as_the_papers():
+    episodes = {name: program.study_of(name).episodes for name in program.STUDIES}
+    assert {name for name, number in episodes.items() if number < 100} == SMALLER
 
 
 @pytest.mark.parametrize("table", TABLES)
