@@ -136,9 +136,11 @@ def _outcome(work: Callable[[], int], was_interrupted: Callable[[], bool]) -> tu
             return work(), ""
     except SystemExit as end:  # of help, or of a line that cannot be read
         return int(end.code or DONE), ""
-    except (ValueError, OSError, ImportError, MemoryError, SystemError) as error:
+    except Exception as error:
         if was_interrupted() and not isinstance(error, MemoryError):
             return INTERRUPTED, "interrupted"  # which a library made into another exception
+        if not isinstance(error, (ValueError, OSError, ImportError, MemoryError, SystemError)):
+            raise
         is_input = isinstance(error, (ValueError, *WRONG_NAMES))
         return BAD_INPUT if is_input else FAILED, f"error: {_said(error)}"
     except KeyboardInterrupt:

@@ -1,5 +1,6 @@
 """The command line without a command, likely names, and how commands end."""
 
+import ctypes
 import os
 import signal
 import time
@@ -46,15 +47,21 @@ def test_the_version_is_told(swarm_mj):
     assert swarm_mj("--version").stdout.startswith("swarm-mj ")
 
 
-def test_what_a_library_makes_of_an_interruption_is_one(capsys):
-    """As matplotlib, which complains of a matrix that it could not finish."""
+@pytest.mark.parametrize("kind", [ValueError, ctypes.ArgumentError])
+def test_what_a_library_makes_of_an_interruption_is_one(kind, capsys):
+    """As matplotlib, which complains of a matrix, and ctypes, of an argument it did not convert."""
 
     def work():
         try:
             os.kill(os.getpid(), signal.SIGTERM)
             time.sleep(10.0)
         except KeyboardInterrupt:
-            raise ValueError("a matrix") from None
+            raise kind("a matrix") from None
 
     assert _exit_code("some", work) == INTERRUPTED
     assert capsys.readouterr().err == "some: interrupted\n"
+
+
+def test_without_an_interruption_a_fault_of_the_code_is_raised():
+    with pytest.raises(ZeroDivisionError):
+        _exit_code("some", lambda: 1 // 0)
