@@ -32,9 +32,7 @@ class FiguresOptions:
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
     policy: tuple[str, ...] = setting((), HELP["policy"], metavar="NAME", shown="all")
     force: bool = setting(False, "replace existing figures")
-    yes: bool = setting(
-        False, f"ignored: drawing needs little memory; will be removed in {GONE_IN}"
-    )
+    yes: bool = setting(False, f"ignored: drawing needs little memory; removed in {GONE_IN}")
     flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)
     flock_seed: int = setting(1, "its seed", group=FLOCKS)
 

@@ -51,7 +51,7 @@ class ReplayOptions:
     fps: int | None = _video(None, HELP["fps"], low=1, high=60, shown="25; GIF: 15")
     scene: str | None = _video(None, HELP["scene"], metavar=SHOWN_AS, shown=BARE)
     force: bool = _video(False, "replace an existing video or picture")
-    yes: bool = _video(False, f"ignored: videos need no estimate; will be removed in {GONE_IN}")
+    yes: bool = _video(False, f"ignored: videos need no estimate; removed in {GONE_IN}")
 
 
 def run(options: ReplayOptions) -> int:

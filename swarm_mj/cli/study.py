@@ -50,8 +50,8 @@ def run(options: StudyOptions) -> int:
     before, after = (read_missions(Path(name)) for name in named)
     for cost in ("aoi", "task_cost"):
         rows = compared(before, after, cost)
-        table = rows.to_string(index=False, na_rep="-", float_format="{:.3g}".format)
         if len(rows):  # tasks without a cost have none
+            table = rows.to_string(index=False, na_rep="-", float_format="{:.3g}".format)
             plain_console().print(f"{cost}, means over missions, with 95 % intervals\n{table}\n")
     return DONE
 

@@ -78,7 +78,7 @@ def test_every_study_can_be_read_and_says_its_missions(name):
 
 def test_policies_fly_as_many_missions_as_the_papers():
     episodes = {name: program.study_of(name).episodes for name in program.STUDIES}
-    assert {name for name, number in episodes.items() if number < 100} == SMALLER
+    assert {name for name, number in episodes.items() if number != 100} == SMALLER
 
 
 @pytest.mark.parametrize("table", TABLES)
