@@ -1,7 +1,6 @@
 """`swarm-mj bench`: how fast the simulation and its parts are on this machine."""
 
 import platform
-import tomllib
 from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
@@ -23,7 +22,16 @@ from swarm_mj.system.writing import Output, check_outputs, write_json
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 HELP = OPTIONS["bench"]
 BUSY = 0.3  # the spread from which on numbers say little
-LEGEND: str = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["legend"]
+LEGEND = """
+window: 100 ms of a mission. The indented rows below the line are its parts.
+plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
+arena blocks: costs most in MuJoCo, which looks for contacts in each of its ten steps a window.
+time to decide: processor time of one thread, which decides for all robots, in the mean of the first
+120 windows of a mission. The planner's includes its plans, once in half as many windows as there
+are robots. Where robots walk, planner --payload none flies as spatial-tdma.
+team decision: the network decides for all robots of a team, in one window.
+process: its largest memory. team: its memory beyond that of a team of three robots, and below it
+what `fly` estimates."""
 
 
 @dataclass(frozen=True, kw_only=True)

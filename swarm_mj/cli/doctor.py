@@ -4,8 +4,7 @@ import json
 import os
 import platform
 import sys
-import tomllib
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from importlib import metadata
 from itertools import groupby
@@ -17,7 +16,9 @@ from packaging.requirements import Requirement
 from rich.console import Console
 from rich.table import Column, Table
 
+from swarm_mj.cli import main
 from swarm_mj.radio import reception
+from swarm_mj.replay.rendering import opengl
 from swarm_mj.replay.view import has_display
 from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
@@ -31,8 +32,15 @@ State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 PACKAGE = "swarm_mj"
 MAX_LETTERS = 400  # of what a trial complains, cut between words
-_TRIALS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-RENDERING: dict[str, str] = _TRIALS["rendering"]  # by MuJoCo's back ends, and how to get each
+FLIGHT = (  # the arguments of a flight that takes a moment
+    *("fly", "--task", "stationary", "--policy", "tdma", "--robots", "3", "--windows", "5"),
+    *("--range-ratio", "10", "--no-record"),
+)
+RENDERING = {  # MuJoCo's back ends, and how to get each
+    "egl": "needs a graphics driver with EGL; or use osmesa",
+    "osmesa": "Debian and Ubuntu: apt-get install libosmesa6",
+    "glfw": "needs a display; else use egl or osmesa",
+}
 
 
 class Finding(NamedTuple):
@@ -103,16 +111,21 @@ def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
 def tried() -> Iterator[Finding]:
     """Fly, and render by each back end, to find what works."""
     mend = "see what `swarm-mj fly` says"
-    yield _of_trial(Finding("flying", "three robots fly", "broken", mend=mend), _TRIALS["flight"])
+    failed = Finding("flying", "three robots fly", "broken", mend=mend)
+    yield _of_trial(failed, attempt(fly_three_robots))
     for name, mend in RENDERING.items():
         failed = Finding("rendering without a display", f"MUJOCO_GL={name}", "absent", mend=mend)
-        # What else is set for PyOpenGL would bind all of them to one back end.
-        yield _of_trial(failed, _TRIALS["render"], {"MUJOCO_GL": name, "PYOPENGL_PLATFORM": name})
+        yield _of_trial(failed, attempt(opengl.render_nothing, opengl.variables_of(name)))
 
 
-def _of_trial(failed: Finding, program: str, variables: Mapping[str, str] | None = None) -> Finding:
-    """Return what a program shows by its end: that a thing works, or as it is found if not."""
-    works, said = attempt(program, variables)
+def fly_three_robots() -> None:
+    """Fly a moment, and end this process as `swarm-mj fly` would; tried in one of its own."""
+    sys.exit(main(FLIGHT))
+
+
+def _of_trial(failed: Finding, outcome: tuple[bool, str]) -> Finding:
+    """Return what a trial shows by its end: that a thing works, or as it is found if not."""
+    works, said = outcome
     if works:
         return failed._replace(state="ok", found="works", mend="")
     return failed._replace(found=shorten(said, MAX_LETTERS, placeholder=" ..."))

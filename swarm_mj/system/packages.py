@@ -10,7 +10,17 @@ from importlib.util import find_spec
 from pathlib import Path
 
 # What flying imports; `pyproject.toml` has their versions under the same name.
-CORE = ("jaxtyping", "msgspec", "mujoco", "numba", "numpy", "packaging", "psutil", "rich")
+CORE = (
+    "filelock",
+    "jaxtyping",
+    "msgspec",
+    "mujoco",
+    "numba",
+    "numpy",
+    "packaging",
+    "psutil",
+    "rich",
+)
 # Modules that are named otherwise than the packages that bring them.
 BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
 # What numbers depend on; what is drawn from them is no change to them.

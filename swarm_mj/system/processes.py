@@ -78,14 +78,25 @@ def running(
 
 
 def attempt(
-    program: str, variables: Mapping[str, str] | None = None, *, longest_s: float = LONGEST_S
+    program: str | Callable[[], None],
+    variables: Mapping[str, str] | None = None,
+    *,
+    longest_s: float = LONGEST_S,
 ) -> tuple[bool, str]:
-    """Run a Python program; return whether it ends well, and the last line that it said.
+    """Run a program in a process of its own: it may crash, hang, or settle on a back end for good.
 
-    It has a process of its own, with these environment variables: it may crash or hang, and what
-    it loads may settle on a back end for good.
+    Args:
+        program: A function of a module that can be imported, or a program's text.
+        variables: Environment variables that the process has, beside this one's.
+        longest_s: When it is ended [s].
+
+    Returns:
+        Whether it ended well, and the last line that it said.
     """
-    command, environment = [*PYTHON, "-c", program], os.environ | (variables or {})
+    if callable(program):
+        program = f"from {program.__module__} import {program.__name__} as run; run()"
+    command = [*PYTHON, "-c", program]
+    environment = os.environ | (variables or {})
     with (
         tempfile.TemporaryFile("w+") as said,
         running(command, environment=environment, output=said) as process,

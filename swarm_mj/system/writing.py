@@ -22,6 +22,8 @@ from typing import Any, BinaryIO, NamedTuple
 PAGE = bytes(4096)  # a full disk takes an empty file, but not this
 # The machine's fault, not the name's: the disk is full, fails, or takes nothing.
 MACHINES_FAULT = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO, errno.EROFS)
+# Of some network disks, which know no locks: there nothing keeps other processes out.
+WITHOUT_LOCKS = (errno.ENOSYS, errno.ENOLCK, errno.EOPNOTSUPP, errno.ENOTSUP)
 
 
 class Output(NamedTuple):
@@ -118,21 +120,41 @@ def owned(path: Path) -> Iterator[None]:
     ones are removed in the end. Raises ValueError if another process owns it, and OSError if the
     folder, or the hidden file, cannot be written.
     """
+    from filelock import FileLock, Timeout  # brings asyncio, which is slow to import
+
     target = path.resolve()
     made = [folder for folder in target.parents if not folder.exists()]
     target.parent.mkdir(parents=True, exist_ok=True)
-    lock = target.with_name(f".{target.name}.lock")
-    number = _locked(lock, path)
+    hidden = target.with_name(f".{target.name}.lock")
+    # No soft lock: a mere file would outlive a process that is killed.
+    lock = FileLock(hidden, blocking=False, fallback_to_soft=False)
     try:
-        os.ftruncate(number, 0)
-        os.write(number, str(os.getpid()).encode())
+        lock.acquire()
+        hidden.write_text(str(os.getpid()))
+    except Timeout:
+        owner = _said_by(hidden) or "of another user"
+        ways = "wait until it is done, end it, or name another"
+        raise ValueError(f"{path} is being written by process {owner}; {ways}") from None
+    except OSError as error:
+        if error.errno not in WITHOUT_LOCKS:
+            raise
+    try:
         yield
     finally:
-        lock.unlink(missing_ok=True)
-        os.close(number)
+        # Before it is unlocked: whoever waits for it sees that it has no name any more.
+        hidden.unlink(missing_ok=True)
+        lock.release()
         with suppress(OSError):  # until one is not empty
             for folder in made:
                 folder.rmdir()
+
+
+def _said_by(file: Path) -> str:
+    """Return what a small file says; nothing if it is gone or may not be read."""
+    try:
+        return file.read_text(errors="replace")[:20]
+    except OSError:
+        return ""
 
 
 def _check_place(what: str, path: Path, *, must_be_new: bool) -> None:
@@ -143,25 +165,6 @@ def _check_place(what: str, path: Path, *, must_be_new: bool) -> None:
             raise ValueError(f"{what} {path} is a {kind}; name a file")
         if must_be_new:
             raise ValueError(f"{what} {path} exists; name another, or replace it with --force")
-
-
-def _locked(lock: Path, path: Path) -> int:
-    """Return the hidden file, open and locked, if the disk knows locks."""
-    while True:
-        number = os.open(lock, os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW, 0o666)
-        try:
-            fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
-            owner = os.read(number, 20).decode(errors="replace") or "of another user"
-            os.close(number)
-            ways = "wait until it is done, end it, or name another"
-            raise ValueError(f"{path} is being written by process {owner}; {ways}") from None
-        except OSError:  # some network disks know no locks
-            return number
-        # Its last owner may have removed it between the two steps: then it locks no name.
-        if lock.exists() and os.path.samestat(os.fstat(number), lock.stat()):
-            return number
-        os.close(number)
 
 
 @contextmanager

@@ -19,6 +19,7 @@ OFF = ("disable", "disabled", "off", "false", "0")
 ON = ("enable", "enabled", "on", "true", "1")
 NAMES = ("egl", "osmesa", "glfw", "glx", "cgl", "wgl")  # each works on some systems
 WITHOUT_SCREEN = ("egl", "osmesa")  # on Linux; EGL may have a graphics card, OSMesa never
+# In words, as a process that imports this package takes a second to start.
 TRIAL = "from mujoco.{} import GLContext; GLContext(8, 8).make_current()"
 WAY_OUT = (
     "rendering needs OpenGL; on Debian and Ubuntu, `apt-get install libosmesa6` draws without a "
@@ -83,6 +84,20 @@ def _first_that_works() -> str:
     return found
 
 
+def variables_of(name: str) -> dict[str, str]:
+    """Return the environment variables by which a process draws with this back end alone."""
+    # What else is set for PyOpenGL would bind it to another.
+    return {CHOICE: name, PYOPENGL: name}
+
+
+def render_nothing() -> None:
+    """Draw an empty scene by the back end that MUJOCO_GL names; raises what that raises."""
+    import mujoco  # which settles on a back end
+
+    with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 32, 32) as renderer:
+        renderer.render()
+
+
 def _works(name: str) -> bool:
-    works, _ = attempt(TRIAL.format(name), {CHOICE: name, PYOPENGL: name})
+    works, _ = attempt(TRIAL.format(name), variables_of(name))
     return works
