@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import beyond_free_space
+from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.gain_table import GainTable
 from swarm_mj.system.fields import check_callable, name_of, setting
 from swarm_mj.system.user_code import call, file_of, make
