@@ -1,4 +1,4 @@
-"""What a channel has beyond the paper's free space: every effect in one place, path loss to clocks.
+"""Effects of a channel beyond the paper's free space, from path loss to clocks, each in one place.
 
 An effect says whether a mission has it (`of`), how a title names it, and what it changes of a
 channel's numbers (`change`). The list of all effects, `EFFECTS`, is made from their classes. From
@@ -53,7 +53,7 @@ class Effect(ABC):
 class MissionEffect(Effect):
     """An effect that numbers of the mission make.
 
-    A class names the fields of `Mission` that it `reads`; the first line of its docstring is its
+    A class names the fields of `Mission` that it `reads`, as no other does; its docstring is its
     row in the documentation.
     """
 
@@ -75,11 +75,14 @@ class MissionEffect(Effect):
 class PathLoss(
     MissionEffect, reads=("path_loss", "loss_exponent", "reference_m", "antenna_height_m")
 ):
-    """Power falls more steeply than in free space beyond some distance.
+    """Mean power falls as in free space up to a distance, and more steeply beyond it.
 
-    To add a law, name it in `PathLossLaw`, and its parameters in `Mission`; here it gets a case.
+    `log-distance`: 10 n dB for every tenfold distance beyond the reference distance. `two-ray`: 40
+    dB per decade beyond the crossover distance, as the reflection from the ground nearly cancels
+    the direct ray (both: Rappaport 2002).
     """
 
+    # To add a law, name it in `PathLossLaw` and its parameters in `Mission`; here it gets a case.
     breakpoint_m: float  # up to which free space holds
     exponent: float  # n, beyond it: tenfold distance costs 10 n dB
 
@@ -118,7 +121,11 @@ class PathLoss(
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Shadowing(MissionEffect, reads=("shadowing_db", "shadowing_distance_m")):
-    """Mean powers are log-normal, the same in both directions, and correlated in space."""
+    """Mean power is log-normal, the same in both directions.
+
+    Its correlation falls to 1/e as one end of a link moves by the shadowing distance (Gudmundson
+    1991; for two ends that move, Wang, Tameh and Nix 2008).
+    """
 
     std_db: float
     distance_m: float
@@ -144,7 +151,11 @@ class Shadowing(MissionEffect, reads=("shadowing_db", "shadowing_distance_m")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Fading(MissionEffect, reads=("fading", "rician_k")):
-    """The power of each link is drawn anew in each slot, the same in both directions."""
+    """The power of each link is drawn anew in each slot, the same in both directions.
+
+    `rayleigh`: without a line of sight. `rician`: K is the power of the line of sight over that of
+    all scattered waves.
+    """
 
     rician_k: float  # linear [1]
 
@@ -172,7 +183,7 @@ class Fading(MissionEffect, reads=("fading", "rician_k")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Erasure(MissionEffect, reads=("erasure",)):
-    """Each receiver loses a share of the packets that it would decode."""
+    """Each receiver loses that share of the packets that it would decode."""
 
     probability: float  # of each packet at each receiver [1]
 
@@ -190,7 +201,10 @@ class Erasure(MissionEffect, reads=("erasure",)):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bursts(MissionEffect, reads=("burst_begin", "burst_end")):
-    """Each receiver goes deaf and hears again, with a probability per slot for either."""
+    """Each receiver stops receiving, with the first probability per slot, for a while.
+
+    It recovers with the second (Gilbert 1960, Elliott 1963).
+    """
 
     begin: float  # per slot [1]
     end: float  # per slot [1]
@@ -214,7 +228,7 @@ class Bursts(MissionEffect, reads=("burst_begin", "burst_end")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HighPower(MissionEffect, reads=("high_power_fraction", "high_power_db")):
-    """A fraction of the robots, the first ones, transmits with more power."""
+    """This fraction of the robots, the first ones, transmits with more power."""
 
     num_robots: int  # that do
     extra_db: float
@@ -245,7 +259,10 @@ class HighPower(MissionEffect, reads=("high_power_fraction", "high_power_db")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clocks(MissionEffect, reads=("clock_offset_s", "clock_drift_ppm")):
-    """Each robot's slots begin later, by an offset that is drawn and a drift either way."""
+    """Each robot's slots begin later, by an offset that is drawn uniformly up to the first.
+
+    Clocks also drift, by up to the second, either way.
+    """
 
     offset: float  # the greatest [slots]
     drift: float  # the greatest [1]
