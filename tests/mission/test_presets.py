@@ -5,7 +5,7 @@ import math
 import pytest
 
 from swarm_mj.mission import PRESETS, WORLDS, paper, reference
-from swarm_mj.physics.arenas import LOSS_DB
+from swarm_mj.physics.arenas import BUILDING
 from swarm_mj.radio.free_space import path_loss_db
 
 TASKS = ["stationary", "random-walk", "flocking"]
@@ -88,5 +88,5 @@ def test_a_block_takes_about_what_umi_loses_without_line_of_sight():
     """At 200 m, 2.4 GHz: 35.3 log10(200) + 22.4 + 21.3 log10(2.4) dB without line of sight."""
     urban = PRESETS["urban"]()
     without_db = 35.3 * math.log10(200.0) + 22.4 + 21.3 * math.log10(2.4)
-    through_db = loss_db(urban, 200.0) + LOSS_DB["building"]
+    through_db = loss_db(urban, 200.0) + BUILDING.loss_db
     assert through_db == pytest.approx(without_db, abs=2.0)
