@@ -15,8 +15,8 @@ from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.evaluation.summary import Evaluated, study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components
 from swarm_mj.policies.registry import listed, missions_memory
+from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check_value
 from swarm_mj.system.needs import Needs, check_fits, memory_errors
 from swarm_mj.system.packages import need

@@ -9,9 +9,9 @@ import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import bits_per_second, where_flown
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.packets import BITS_PER_BYTE
+from swarm_mj.radio.words import bits_per_second, where_flown
 from swarm_mj.simulation.rollout import Summary
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed

@@ -21,13 +21,13 @@ from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.api.run import Metrics, Run
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, make_mission
-from swarm_mj.mission.components import Components
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observer
+from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system import needs

@@ -14,8 +14,8 @@ from matplotlib.patches import Polygon, Rectangle
 
 from swarm_mj.api.charts import kept
 from swarm_mj.evaluation.figures.style import CAPTION, escape_mathtext, styled
-from swarm_mj.mission.presets import where_flown
 from swarm_mj.physics import arenas, outlines, scene, state
+from swarm_mj.radio.words import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
 from swarm_mj.system.packages import version

@@ -14,10 +14,10 @@ from rich.table import Table
 
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.costs import PACKET_COUNTS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
+from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system import terminal
 from swarm_mj.system.fields import as_typed, did_you_mean

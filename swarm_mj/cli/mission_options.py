@@ -10,9 +10,9 @@ from typing import Any
 from swarm_mj.cli import OPTIONS
 from swarm_mj.cli.options import flags_of, nested, nested_option
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
-from swarm_mj.mission.components import GROUP, SHOWN_AS, Components
 from swarm_mj.mission.presets import NEEDED
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
+from swarm_mj.simulation.components import GROUP, SHOWN_AS, Components
 from swarm_mj.system.fields import FieldOf, as_typed, kind_of, setting
 
 HELP = OPTIONS["policies"]

@@ -11,12 +11,13 @@ from rich.console import Console
 
 from swarm_mj.cli import OPTIONS
 from swarm_mj.evaluation.figures import quiet_matplotlib
-from swarm_mj.mission.components import SHOWN_AS, Components, is_own
 from swarm_mj.replay import view
+from swarm_mj.simulation.components import SHOWN_AS, Components
 from swarm_mj.system.fields import GONE_IN, setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.user_code import is_own
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 if TYPE_CHECKING:

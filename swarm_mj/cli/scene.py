@@ -6,7 +6,7 @@ from pathlib import Path
 
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components
+from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import same_as, setting
 from swarm_mj.system.terminal import plain_console, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_text

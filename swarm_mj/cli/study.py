@@ -10,8 +10,8 @@ from swarm_mj.cli.evaluate import StudyFlags, fly
 from swarm_mj.cli.mission_options import missions_of
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components
 from swarm_mj.policies import registry
+from swarm_mj.simulation.components import Components
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import check_kind, check_names, did_you_mean, setting
 from swarm_mj.system.packages import asset, need

@@ -14,11 +14,12 @@ from swarm_mj.cli.mission_options import COMMON, FLAGS, check_in_use
 from swarm_mj.cli.options import flags_of, nested_option
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
-from swarm_mj.mission.components import GROUP, Components, is_own
 from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
+from swarm_mj.simulation.components import GROUP, Components
 from swarm_mj.system.fields import as_typed
+from swarm_mj.system.user_code import is_own
 
 PARTS = {  # the dataclasses of settings and their headings in the help, by their dotted place
     "": (Training, "run"),

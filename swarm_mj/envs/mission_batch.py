@@ -13,10 +13,10 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
+from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
 
 Observation = dict[str, np.ndarray]

@@ -13,7 +13,6 @@ from jaxtyping import Float32
 from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission, make_mission
-from swarm_mj.mission.components import Components
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
@@ -22,6 +21,7 @@ from swarm_mj.policies.gnn.packet_memory import LONG_WINDOWS
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
+from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check_choice
 
 NUM_OWN = 5  # numbers of a robot itself in `truth`: x, y, their velocities, whether it is active

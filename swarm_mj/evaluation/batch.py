@@ -8,7 +8,6 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import Components, one_line_each
 from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
@@ -16,9 +15,11 @@ from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
+from swarm_mj.system.user_code import one_line_each
 
 TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")  # of `costs.Packets`
 

@@ -20,12 +20,12 @@ from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Protocol, runtime_checkable
 
 from swarm_mj.evaluation.study import Study
-from swarm_mj.mission.components import is_users
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
 from swarm_mj.system.packages import code_digest, need
 from swarm_mj.system.processes import guard
+from swarm_mj.system.user_code import is_users
 
 Work = Callable[[Any], Any]
 Done = Generator[tuple[int, Any]]  # pieces' indices and products

@@ -14,7 +14,7 @@ from pyarrow import parquet
 from swarm_mj.evaluation.results import config_of
 from swarm_mj.evaluation.summary import COSTS, Evaluated, bootstrap_interval
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import CALLED_WITH
+from swarm_mj.simulation.components import CALLED_WITH
 from swarm_mj.system.fields import kind_of
 from swarm_mj.system.reading import open_file
 from swarm_mj.system.writing import write_bytes

@@ -11,9 +11,9 @@ from swarm_mj.evaluation.batch import Batch
 from swarm_mj.evaluation.published import BASELINES
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
-from swarm_mj.mission.components import Components, digest
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Parameters, Policy
+from swarm_mj.simulation.components import Components, digest
 from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.packages import code_digest, commit, version
 

@@ -15,9 +15,9 @@ from swarm_mj.evaluation.published import published
 from swarm_mj.evaluation.results import COLUMNS, Result, write_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import radio_in_words
 from swarm_mj.policies.registry import flown_name
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.radio.words import radio_in_words
 from swarm_mj.system.writing import write_json
 
 COSTS = ("aoi", "velocity_variance", "task_cost")  # of each mission; only some have the last

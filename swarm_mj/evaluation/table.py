@@ -13,9 +13,10 @@ from rich.table import Table
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
-from swarm_mj.mission.presets import bits_per_second, paper
+from swarm_mj.mission.presets import paper
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.protocol.packets import BITS_PER_BYTE
+from swarm_mj.radio.words import bits_per_second
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the table

@@ -10,9 +10,9 @@ import msgspec
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
-from swarm_mj.mission.components import Components
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
 from swarm_mj.policies.policy_config import GnnShape, check_fit
+from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check, check_value, common_setting, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team

@@ -2,12 +2,14 @@
 
 Obstacles attenuate packets and, in `contact` physics, reflect robots. They are the static geoms of
 group `OBSTACLE_GROUP`. The penetration loss of one is its first `user` number [dB]; without one, or
-with 0, that of its material's name (`LOSS_DB`), or `DEFAULT_LOSS_DB`.
+with 0, that of its material's name (`MATERIALS`), or `DEFAULT_LOSS_DB`.
+
+To add an arena, write its function beside what it is made of, and name it in `ARENAS`.
 """
 
 import os
-import tomllib
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from xml.etree import ElementTree
@@ -28,21 +30,29 @@ Arena = Callable[[MjSpec, Mission], None]  # adds the obstacles
 
 OBSTACLE_GROUP = 1
 MESH = 7  # as MuJoCo numbers it
+BOX_SHAPE = mjtGeom.mjGEOM_BOX
+CYLINDER_SHAPE = mjtGeom.mjGEOM_CYLINDER
 HALF_HEIGHT_M = 5.0  # of obstacles: well above the robots
-BLOCK_PITCH_M = 200.0  # from street to street
-BLOCK_M = 110.0  # side of a city block; the rest of the pitch is street
-ROOM_M = 170.0  # side of a room
-DOOR_M = 25.0  # width of the door in the middle of every wall between two rooms
-WALL_M = 1.0  # thickness of these walls
 NOT_FINITE = ("nan", "inf", "infinity")
 FOLDERS = ("meshdir", "texturedir", "assetdir")  # of files that a compiler element names
 MAX_REPLICAS = 10_000  # of a <replicate>; more would be compiled for minutes
 NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
-TREES_PER_KM2 = 100.0
-TREE_RADIUS_M = 6.0
-_MATERIALS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-LOSS_DB: dict[str, float] = _MATERIALS["loss_db"]
-DEFAULT_LOSS_DB = 10.0
+DEFAULT_LOSS_DB = 10.0  # of obstacles in a file that neither say their loss nor name a material
+
+MATERIALS: dict[str, "Material"] = {}  # by name; whoever makes one enters it here
+
+
+@dataclass(frozen=True, kw_only=True)
+class Material:
+    """What obstacles are made of; geoms, those of a file too, name it."""
+
+    name: str
+    loss_db: float  # per obstacle crossed [dB]
+    rgba: tuple[float, float, float, float]  # red, green, blue and opacity, from 0 to 1
+    source: str  # of the loss
+
+    def __post_init__(self) -> None:
+        MATERIALS[self.name] = self
 
 
 def arena_of(mission: Mission) -> Arena | None:
@@ -64,8 +74,21 @@ def notes_on(mission: Mission) -> list[str]:
     """Return a note on each obstacle in a file that neither robots nor packets can meet."""
     if arena_of(mission) is not _from_file:
         return []
-    idle, begins = idle_obstacles(_read(mission.arena).compile(), mission), f"arena {mission.arena}"
-    return [f"{begins}: {name} does nothing, as it stands {idle[name]}" for name in idle]
+    idle = idle_obstacles(_read(mission.arena).compile(), mission)
+    return [
+        f"arena {mission.arena}: {name} does nothing, as it stands {where}"
+        for name, where in idle.items()
+    ]
+
+
+BLOCK_PITCH_M = 200.0  # from street to street
+BLOCK_M = 110.0  # side of a city block; the rest of the pitch is street
+BUILDING = Material(
+    name="building",
+    loss_db=25.0,
+    rgba=(0.36, 0.40, 0.47, 1.0),
+    source="two outer walls of 7 dB (COST 231 1999, section 4.7) and the rooms between them",
+)
 
 
 def blocks(spec: MjSpec, mission: Mission) -> None:
@@ -74,7 +97,24 @@ def blocks(spec: MjSpec, mission: Mission) -> None:
     pitch_m = mission.side_m / num
     middles_m = [(n - (num - 1) / 2.0) * pitch_m for n in range(num)]
     for x, y in product(middles_m, middles_m):
-        _add(spec, "building", "box", (x, y), (BLOCK_M / 2.0, BLOCK_M / 2.0))
+        _add(spec, BUILDING, BOX_SHAPE, (x, y), (BLOCK_M / 2.0, BLOCK_M / 2.0))
+
+
+ROOM_M = 170.0  # side of a room
+DOOR_M = 25.0  # width of the door in the middle of every wall between two rooms
+WALL_M = 1.0  # thickness of these walls
+LIGHT_WALL = Material(
+    name="light wall",
+    loss_db=3.4,
+    rgba=(0.45, 0.50, 0.58, 1.0),
+    source="COST 231 (1999), section 4.7, at 1.8 GHz",
+)
+HEAVY_WALL = Material(  # for files: no arena of the package has it
+    name="heavy wall",
+    loss_db=6.9,
+    rgba=(0.40, 0.44, 0.52, 1.0),
+    source="COST 231 (1999), section 4.7, at 1.8 GHz",
+)
 
 
 def rooms(spec: MjSpec, mission: Mission) -> None:
@@ -88,15 +128,27 @@ def rooms(spec: MjSpec, mission: Mission) -> None:
         for along in range(num):
             middle = (along + 0.5) * side_m - mission.half_side_m
             for side in (-off_m, off_m):
-                _add(spec, "light wall", "box", (wall, middle + side), (WALL_M / 2.0, half_m))
-                _add(spec, "light wall", "box", (middle + side, wall), (half_m, WALL_M / 2.0))
+                _add(spec, LIGHT_WALL, BOX_SHAPE, (wall, middle + side), (WALL_M / 2.0, half_m))
+                _add(spec, LIGHT_WALL, BOX_SHAPE, (middle + side, wall), (half_m, WALL_M / 2.0))
+
+
+TREES_PER_KM2 = 100.0
+TREE_RADIUS_M = 6.0
+TREE = Material(
+    name="tree",
+    loss_db=6.0,
+    rgba=(0.20, 0.38, 0.30, 1.0),
+    source="12 m of leaves at about 0.5 dB/m (ITU-R P.833)",
+)
 
 
 def forest(spec: MjSpec, mission: Mission) -> None:
     """Add trees, spread evenly but not in rows: the points of Halton (1960) in bases 2 and 3."""
-    for n in range(1, round(TREES_PER_KM2 * mission.side_m**2 / SQUARE_METRES_PER_KM2) + 1):
-        x, y = ((_halton(n, base) - 0.5) * mission.side_m for base in (2, 3))
-        _add(spec, "tree", "cylinder", (x, y), (TREE_RADIUS_M, HALF_HEIGHT_M))
+    num = round(TREES_PER_KM2 * mission.side_m**2 / SQUARE_METRES_PER_KM2)
+    for n in range(1, num + 1):
+        x = (_halton(n, base=2) - 0.5) * mission.side_m
+        y = (_halton(n, base=3) - 0.5) * mission.side_m
+        _add(spec, TREE, CYLINDER_SHAPE, (x, y), (TREE_RADIUS_M, HALF_HEIGHT_M))
 
 
 ARENAS: dict[str, Arena | None] = {OPEN: None, "blocks": blocks, "forest": forest, "rooms": rooms}
@@ -132,8 +184,11 @@ def _read(file: str) -> MjSpec:
     path = Path(file).absolute()  # MuJoCo finds what included files include by no other
     try:
         elements = list(_elements(path))
-        leads = (each.get(key) for each in elements if each.tag == "compiler" for key in FOLDERS)
-        folders = {path.parent, *(path.parent / lead for lead in leads if lead)}
+        folders = {path.parent}
+        for element in elements:
+            if element.tag == "compiler":
+                leads = (element.get(key) for key in FOLDERS)
+                folders.update(path.parent / lead for lead in leads if lead)
         for element in elements:
             _check_element(element, folders)
         return MjSpec.from_file(str(path))
@@ -148,13 +203,15 @@ def _elements(path: Path, above: tuple[Path, ...] = ()) -> Iterator[ElementTree.
     try:
         root = ElementTree.parse(path)
     except ElementTree.ParseError as error:
-        line, said = error.position[0], str(error).partition(":")[0]
+        line = error.position[0]
+        said = str(error).partition(":")[0]
         raise ValueError(f"{path.name}, line {line}: not well-formed XML ({said})") from error
     for element in root.iter():
         yield element
         if element.tag == "include":
             _check_element(element, folders)  # before it is opened
-            for included in (folder / element.get("file", "") for folder in folders):
+            for folder in folders:
+                included = folder / element.get("file", "")
                 if included.is_file() and not any(map(included.samefile, files)):
                     yield from _elements(included, files)
 
@@ -162,19 +219,32 @@ def _elements(path: Path, above: tuple[Path, ...] = ()) -> Iterator[ElementTree.
 def _check_element(element: ElementTree.Element, folders: set[Path]) -> None:
     """Raise ValueError for numbers that are none, and for pipes and replicas without an end."""
     for key, value in element.attrib.items():
-        words = [] if key in NAMING else value.lower().split()
-        if wrong := [word for word in words if word.lstrip("+-") in NOT_FINITE]:
-            named = element.get("name", "without a name")
-            raise ValueError(f"{element.tag} {named} has {wrong[0]} in {key}")
+        if key in NAMING:
+            continue
+        for word in value.lower().split():
+            if word.lstrip("+-") in NOT_FINITE:
+                named = element.get("name", "without a name")
+                raise ValueError(f"{element.tag} {named} has {word} in {key}")
+    _check_count(element)
+    _check_file(element, folders)
+
+
+def _check_count(element: ElementTree.Element) -> None:
+    """Raise ValueError for more replicas than compile in a while."""
     count = element.get("count", "")
     if element.tag == "replicate" and count.isdigit() and int(count) > MAX_REPLICAS:
         raise ValueError(f"replicate has a count of {count}; {MAX_REPLICAS} are allowed")
-    if name := element.get("file"):
-        for path in (folder / name for folder in folders):
-            if path.exists() and not path.is_file():
-                raise ValueError(
-                    f"{element.tag} {name} is a folder, a pipe or a device; name a file"
-                )
+
+
+def _check_file(element: ElementTree.Element, folders: set[Path]) -> None:
+    """Raise ValueError for what a file's name leads to, but is none: MuJoCo would wait for it."""
+    name = element.get("file")
+    if not name:
+        return
+    for folder in folders:
+        path = folder / name
+        if path.exists() and not path.is_file():
+            raise ValueError(f"{element.tag} {name} is a folder, a pipe or a device; name a file")
 
 
 def _refused(file: str, error: ValueError) -> ValueError:
@@ -182,15 +252,20 @@ def _refused(file: str, error: ValueError) -> ValueError:
 
 
 def _add(
-    spec: MjSpec, material: str, shape: str, centre_m: tuple[float, ...], size_m: tuple[float, ...]
+    spec: MjSpec,
+    material: Material,
+    shape: mjtGeom,
+    centre_m: tuple[float, float],
+    size_m: tuple[float, float],
 ) -> None:
-    if spec.material(material) is None:
-        spec.add_material(name=material, rgba=_MATERIALS["rgba"][material])
+    """Add an obstacle that stands on the floor: half sides of a box, or radius and half height."""
+    if spec.material(material.name) is None:
+        spec.add_material(name=material.name, rgba=list(material.rgba))
     spec.worldbody.add_geom(
-        type=getattr(mjtGeom, f"mjGEOM_{shape.upper()}"),
+        type=shape,
         pos=[*centre_m, HALF_HEIGHT_M],
         size=[*size_m, HALF_HEIGHT_M],
-        material=material,
+        material=material.name,
         group=OBSTACLE_GROUP,
         contype=1,
         conaffinity=0,
@@ -199,7 +274,8 @@ def _add(
 
 def _halton(n: int, base: int) -> float:
     """Return the n-th point of the van der Corput sequence, in (0, 1)."""
-    share, point = 1.0 / base, 0.0
+    share = 1.0 / base
+    point = 0.0
     while n > 0:
         n, digit = divmod(n, base)
         point += digit * share
@@ -212,13 +288,15 @@ def obstacles_of(model: MjModel) -> Obstacles:
     data = MjData(model)
     mj_kinematics(model, data)
     found = np.array(obstacle_geoms(model), dtype=int)
-    kind, size_m = model.geom_type[found].copy(), model.geom_size[found].copy()
+    kind = model.geom_type[found].copy()
+    size_m = model.geom_size[found].copy()
     centre_m = data.geom_xpos[found].copy()
     rotation = data.geom_xmat[found].reshape(-1, 3, 3).copy()
     for o in np.flatnonzero(kind == MESH):
         middle_m, half_m = np.split(model.geom_aabb[found[o]], 2)
         centre_m[o] += rotation[o] @ middle_m
-        kind[o], size_m[o] = BOX, half_m
+        kind[o] = BOX
+        size_m[o] = half_m
     is_finite = np.isfinite(np.column_stack([centre_m, size_m])).all(axis=1)
     if not np.all(is_finite):
         g = int(found[np.argmin(is_finite)])
@@ -245,7 +323,8 @@ def obstacle_geoms(model: MjModel) -> list[int]:
 def idle_obstacles(model: MjModel, mission: Mission) -> dict[str, str]:
     """Return the obstacles that neither robots nor packets can meet, and where they stand."""
     reach_m = mission.half_side_m if mission.has_walls else np.inf  # from the centre, per axis
-    found, idle = obstacles_of(model), {}
+    found = obstacles_of(model)
+    idle: dict[str, str] = {}
     for o, g in enumerate(obstacle_geoms(model)):
         # Of the box around it that MuJoCo keeps, in the obstacle's frame; a ball may be narrower.
         half_m = np.abs(found.rotation[o]) @ model.geom_aabb[g, 3:]
@@ -264,7 +343,8 @@ def loss_db_of(model: MjModel, g: int) -> float:
     """Return an obstacle's penetration loss [dB]; raise ValueError if negative or not finite."""
     material = int(model.geom_matid[g])
     named = model.mat(material).name if material >= 0 else ""
-    loss_db = LOSS_DB.get(named, DEFAULT_LOSS_DB)
+    known = MATERIALS.get(named)
+    loss_db = DEFAULT_LOSS_DB if known is None else known.loss_db
     if model.nuser_geom > 0 and model.geom_user[g, 0] != 0.0:  # 0 where a geom has none
         loss_db = float(model.geom_user[g, 0])
     if not (np.isfinite(loss_db) and loss_db >= 0.0):

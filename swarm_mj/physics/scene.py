@@ -2,9 +2,7 @@
 
 import copy
 import math
-import tomllib
-from collections.abc import Callable
-from pathlib import Path
+from typing import Protocol, runtime_checkable
 from xml.etree import ElementTree
 
 import numpy as np
@@ -16,7 +14,31 @@ from swarm_mj.physics.arenas import OBSTACLE_GROUP, arena_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.packages import asset
 
-Scene = Callable[[MjSpec, Mission], None]  # changes the arena before it is compiled
+
+@runtime_checkable
+class Scene(Protocol):
+    """What changes the arena before it is compiled: any function of these two arguments.
+
+    Example:
+        >>> import mujoco
+        >>> def pillar(spec, mission):
+        ...     shape = mujoco.mjtGeom.mjGEOM_CYLINDER
+        ...     spec.worldbody.add_geom(type=shape, size=[2.0, 5.0, 0.0], pos=[0.0, 0.0, 5.0])
+    """
+
+    def __call__(self, spec: MjSpec, mission: Mission, /) -> object:
+        """Add bodies, geoms and sites; the robots, how they move and how MuJoCo steps must stay.
+
+        Args:
+            spec: MuJoCo's editable model of the arena, with the robots in it. Static geoms of
+                group 1 are obstacles, which also attenuate packets.
+            mission: Whose area and team it is.
+
+        Returns:
+            Anything; it is not used.
+        """
+        ...
+
 
 CONTACT_STEP_S = 0.01  # longest step of the `contact` physics: ten per window of 100 ms
 ROBOT_MASS_KG = 1.0  # assets/robot.xml
@@ -30,7 +52,51 @@ ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
 # What a scene must leave: of joints, of actuators, and of MuJoCo's options.
-MOVING = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))["moving"]
+MOVING = (
+    # of joints
+    "axis",
+    "damping",
+    "stiffness",
+    "frictionloss",
+    "armature",
+    "range",
+    "limited",
+    "ref",
+    "springref",
+    "actfrclimited",
+    "solref_limit",
+    "solimp_limit",
+    "actgravcomp",
+    "margin",
+    # of actuators
+    "gear",
+    "gainprm",
+    "biasprm",
+    "gaintype",
+    "biastype",
+    "dyntype",
+    "dynprm",
+    "ctrlrange",
+    "forcerange",
+    "ctrllimited",
+    "forcelimited",
+    # of MuJoCo's options
+    "integrator",
+    "solver",
+    "cone",
+    "jacobian",
+    "enableflags",
+    "disableactuator",
+    "iterations",
+    "tolerance",
+    "ls_iterations",
+    "ls_tolerance",
+    "impratio",
+    "gravity",
+    "wind",
+    "density",
+    "viscosity",
+)
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 
@@ -58,10 +124,19 @@ def compose(
 ) -> MjSpec:
     """Return the editable model of the arena at the mission's size with its N robots.
 
-    A start, of the first mission, is for viewers, and is also the keyframe `start`. Without it, all
-    robots stand at the origin until `Physics.place` moves them. A scene changes the arena with the
-    robots in it; its geoms stop robots in `contact` physics only, as `exact` has no collisions.
-    Raises ValueError if the scene added, took away or renamed joints or actuators.
+    Args:
+        mission: Whose arena it is.
+        start: Where viewers see the robots, those of the first mission; also the keyframe `start`.
+            Without it, all robots stand at the origin until `Physics.place` moves them.
+        scene: What changes the arena with the robots in it. Its geoms stop robots in `contact`
+            physics only, as `exact` has no collisions.
+
+    Returns:
+        The model, which is to be compiled.
+
+    Raises:
+        ValueError: The arena is unknown, or the scene changed how robots move: it added, took away
+            or renamed joints or actuators, or changed one of their numbers or the solver's.
     """
     spec = _arena_with_robots(mission.num_robots)
     spec.option.timestep = timestep_s(mission)
@@ -70,9 +145,11 @@ def compose(
     _fit_robots(spec, mission)
     if mission.collide:
         spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
-    for change in (arena_of(mission), scene):
-        if change is not None:
-            _change(spec, mission, change)
+    arena = arena_of(mission)
+    if arena is not None:
+        _change(spec, mission, arena)
+    if scene is not None:
+        _change(spec, mission, scene)
     if start is not None:
         _place_robots(spec, mission, start)
     return spec
@@ -87,16 +164,23 @@ def _arena_with_robots(num_robots: int) -> MjSpec:
         (whole,) = arena.iter(part)
         for i in range(num_robots):
             added = copy.deepcopy(robot.findall(f"{part}/*"))
-            for each in (each for element in added for each in element.iter()):
-                for key in NAMES.intersection(each.keys()):
-                    each.attrib[key] = f"r{i}/{each.attrib[key]}"
+            for element in added:
+                _rename(element, i)
             whole.extend(added)
     return MjSpec.from_string(ElementTree.tostring(arena, encoding="unicode"))
 
 
+def _rename(element: ElementTree.Element, i: int) -> None:
+    """Make names in an element, and in those within it, names of robot i's own."""
+    for each in element.iter():
+        for key in NAMES.intersection(each.keys()):
+            each.attrib[key] = f"r{i}/{each.attrib[key]}"
+
+
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
     """Let a scene change the arena, but neither the robots' joints nor how MuJoCo steps."""
-    before, flags = _motion(spec), spec.option.disableflags
+    before = _motion(spec)
+    flags = spec.option.disableflags
     scene(spec, mission)
     after = _motion(spec)
     if list(after) != list(before):
@@ -109,7 +193,8 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
             raise ValueError(
                 f"a scene must leave how robots move, but changed {name}; add geoms instead"
             )
-    spec.option.timestep, spec.option.disableflags = timestep_s(mission), flags
+    spec.option.timestep = timestep_s(mission)
+    spec.option.disableflags = flags
     if mission.physics == "exact":
         spec.option.disableflags |= int(mjtDisableBit.mjDSBL_CONTACT)
         return
@@ -139,12 +224,14 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 def _motion(spec: MjSpec) -> dict[str, str]:
     """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
     parts = [(part.name, part) for part in (*spec.joints, *spec.actuators)]
-    return {
-        f"{name} of {owner}": str(np.asarray(value).tolist())  # in which nan is nan
-        for owner, part in [*parts, ("option", spec.option)]
-        for name in MOVING
-        if (value := getattr(part, name, None)) is not None
-    }
+    parts.append(("option", spec.option))
+    motion: dict[str, str] = {}
+    for owner, part in parts:
+        for name in MOVING:
+            value = getattr(part, name, None)
+            if value is not None:
+                motion[f"{name} of {owner}"] = str(np.asarray(value).tolist())  # nan is nan there
+    return motion
 
 
 def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
@@ -152,10 +239,12 @@ def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
 
     A viewer opens a model in its own pose and loads a keyframe only on request.
     """
-    position_m, velocity_mps = start.position_m[0], start.velocity_mps[0]
+    position_m = start.position_m[0]
+    velocity_mps = start.velocity_mps[0]
     for i, (x, y) in enumerate(position_m.tolist()):
         spec.body(f"r{i}/body").pos = [x, y, ROBOT_HEIGHT_M]
-        spec.joint(f"r{i}/x").ref, spec.joint(f"r{i}/y").ref = x, y
+        spec.joint(f"r{i}/x").ref = x
+        spec.joint(f"r{i}/y").ref = y
     key = spec.add_key(name="start", qpos=position_m.ravel(), qvel=velocity_mps.ravel())
     if mission.physics == "exact":  # whose servos take velocities
         key.ctrl = velocity_mps.ravel()
@@ -169,14 +258,16 @@ def _scale_arena(spec: MjSpec, mission: Mission) -> None:
     repeats = mission.side_m * SQUARES_PER_M
     spec.material("floor").texrepeat = [repeats, repeats]
     spec.camera("top").pos = [0.0, 0.0, CAMERA_HEIGHT_PER_SIDE * mission.side_m]
-    centre, across = half + WALL_HALF_THICKNESS_M, half + 2 * WALL_HALF_THICKNESS_M
+    centre = half + WALL_HALF_THICKNESS_M
+    across = half + 2 * WALL_HALF_THICKNESS_M
     for name, x, y in (("east", 1, 0), ("west", -1, 0), ("north", 0, 1), ("south", 0, -1)):
         wall = spec.geom(f"wall_{name}")
         if not mission.has_walls:
             spec.delete(wall)
             continue
         wall.pos = [x * centre, y * centre, WALL_HALF_HEIGHT_M]
-        width, depth = (WALL_HALF_THICKNESS_M if axis else across for axis in (x, y))
+        width = WALL_HALF_THICKNESS_M if x else across
+        depth = WALL_HALF_THICKNESS_M if y else across
         wall.size = [width, depth, WALL_HALF_HEIGHT_M]
 
 
@@ -188,7 +279,8 @@ def _fit_robots(spec: MjSpec, mission: Mission) -> None:
         spec.geom(f"r{i}/beacon").size[0] = beacon_m
         if mission.collide:
             hull = _hull(spec, i)
-            hull.contype = hull.conaffinity = ROBOTS_BIT
+            hull.contype = ROBOTS_BIT
+            hull.conaffinity = ROBOTS_BIT
             _bounce(hull, mission)
     force_n = ROBOT_MASS_KG * mission.max_acceleration_mps2
     for actuator in spec.actuators:

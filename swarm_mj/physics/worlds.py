@@ -33,7 +33,17 @@ class Physics:
         scene: Scene | None = None,
         num_threads: int = 1,
     ) -> None:
-        """Compile the scene, make B worlds; ValueError if it changes robots or does not compile."""
+        """Compile the scene and make B worlds.
+
+        Args:
+            mission: Of all worlds.
+            num_missions: B.
+            scene: A user's, which adds to the arena.
+            num_threads: Of MuJoCo's own.
+
+        Raises:
+            ValueError: The scene changes how robots move, or does not compile.
+        """
         self._mission = mission
         try:
             self._model = compose(mission, scene=scene).compile()
@@ -119,13 +129,15 @@ class Physics:
             return
         limit_mps = self._mission.max_velocity_mps
         limit_mps2 = self._mission.max_acceleration_mps2
-        window_s, step_s = self._mission.window_s, timestep_s(self._mission)
+        window_s = self._mission.window_s
+        step_s = timestep_s(self._mission)
         # One constant acceleration per window, which ends at the clipped velocity of Eq. 15 ...
         target_mps = self._qvel + np.clip(acceleration_mps2, -limit_mps2, limit_mps2) * window_s
         held_mps2 = (np.clip(target_mps, -limit_mps, limit_mps) - self._qvel) / window_s
         for _ in range(num_substeps(self._mission)):
             # ... and after a bounce never pushes beyond the bound, from either side.
-            lowest, highest = (-limit_mps - self._qvel) / step_s, (limit_mps - self._qvel) / step_s
+            lowest = (-limit_mps - self._qvel) / step_s
+            highest = (limit_mps - self._qvel) / step_s
             self._ctrl[...] = ROBOT_MASS_KG * np.clip(held_mps2, lowest, highest)
             self._batch.step()
         np.clip(self._qvel, -limit_mps, limit_mps, out=self._qvel)  # rounding of the last step

@@ -11,7 +11,6 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import is_own, make
 from swarm_mj.policies.carrier_sense import AgeGainCsma, CarrierSense, sensed_dbm
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
@@ -28,6 +27,7 @@ from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check_kind, did_you_mean
 from swarm_mj.system.packages import asset, need
+from swarm_mj.system.user_code import is_own, make
 
 WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
 FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"

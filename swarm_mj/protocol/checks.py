@@ -6,11 +6,11 @@ Index order: `[b, i]` is robot `i` of mission `b`.
 import numpy as np
 from jaxtyping import Float, Int
 
-from swarm_mj.mission.components import is_ours
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.fields import name_of
+from swarm_mj.system.user_code import is_ours
 
 
 def check_robots(

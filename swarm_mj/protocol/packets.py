@@ -13,9 +13,9 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import bits_per_second
 from swarm_mj.protocol.buffers import ABSENT, NEVER, NO_PARENT, Buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.radio.words import bits_per_second
 from swarm_mj.system.compiled import compiled
 
 MAX_STDS = 10.0  # more than any error of a position

@@ -10,9 +10,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.composed import ComposedChannel
+from swarm_mj.radio.effects import model_of
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.radio.power_law import free_space_law
 from swarm_mj.radio.reception import MIN_DISTANCE_M
 from swarm_mj.system.decibels import from_db, to_db
 from swarm_mj.system.reading import open_file
@@ -25,23 +25,34 @@ class GainTable(ComposedChannel):
     """A mission's radio over the links of a table, which are the same in both directions."""
 
     def __init__(self, mission: Mission, path: Path) -> None:
-        """Read a CSV file; raise ValueError if it is no such table."""
+        """Read a table.
+
+        Args:
+            mission: Whose transmit power, noise, SINR threshold and half duplex it has.
+            path: A CSV file: two places [m] and the gain between them [dB] in each row.
+
+        Raises:
+            ValueError: There is no such file, or it is no such table.
+        """
         from scipy.spatial import KDTree  # slow to import
 
         radio = radio_of(mission)
-        law = free_space_law(radio.received_at_1_m_mw, mission.num_robots)
-        hears = radio.recipient_hears_while_sending
-        rule = Reception(radio.noise_mw, radio.threshold, recipient_hears_while_sending=hears)
-        super().__init__(law, rule)
+        model = model_of(radio, mission.num_robots, effects=[])
+        super().__init__(model.law, model.reception)
+        rows = np.empty(0)
         with open_file(path, "table of gains") as file:
             header = file.readline().decode("utf-8-sig").strip()
-            rows = np.loadtxt(file, delimiter=",", ndmin=2) if header == HEADER else np.empty(0)
+            if header == HEADER:
+                rows = np.loadtxt(file, delimiter=",", ndmin=2)
         if len(rows) < NUM_NEAREST or not np.all(np.isfinite(rows)):
             least = f"{NUM_NEAREST} rows of finite numbers or more, with -150 dB for no link"
             raise ValueError(f"a table of gains has a first line {HEADER}, then {least}")
-        ends_m, received_mw = rows[:, :4], radio.power_mw * from_db(rows[:, 4])
+        ends_m = rows[:, :4]
+        received_mw = radio.power_mw * from_db(rows[:, 4])
         apart_m = np.maximum(np.hypot(*(ends_m[:, :2] - ends_m[:, 2:]).T), MIN_DISTANCE_M)
-        self._beyond_db = np.tile(to_db(received_mw * apart_m**2 / radio.received_at_1_m_mw), 2)
+        beyond_db = to_db(received_mw * apart_m**2 / radio.received_at_1_m_mw)
+        # Every pair in both directions: the same numbers with its ends exchanged.
+        self._beyond_db = np.tile(beyond_db, 2)
         self._pairs = KDTree(np.concatenate([ends_m, np.roll(ends_m, 2, axis=1)]))
 
     def received_mw(

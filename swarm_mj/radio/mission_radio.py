@@ -4,7 +4,6 @@ Belief and truth are models before fades, which neither foresees. Index order: `
 receives.
 """
 
-import math
 from dataclasses import dataclass, replace
 from functools import cache
 from typing import NamedTuple
@@ -13,20 +12,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import beyond_free_space
 from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.composed import ComposedChannel, Reception
-from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
+from swarm_mj.radio.effects import Effect, HighPower, Obstruction, effects_of, model_of
+from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
-from swarm_mj.radio.power_law import (
-    FREE_SPACE_EXPONENT,
-    TWO_RAY_EXPONENT,
-    PowerLaw,
-    free_space_law,
-    two_ray_breakpoint_m,
-)
+from swarm_mj.radio.power_law import PowerLaw, free_space_law
 from swarm_mj.system.decibels import from_db
 
 
@@ -94,6 +87,18 @@ def radio_of(mission: Mission) -> FreeSpaceRadio:
 
     It is the true channel of the paper's missions, and what robots believe in all others, unless
     the mission grants more.
+
+    Args:
+        mission: Whose range, frequency, noise, SINR threshold and half duplex it has.
+
+    Returns:
+        A channel, whose numbers (`power_mw`, `noise_mw`, `threshold`) serve channels of your own.
+
+    Example:
+        >>> from swarm_mj import paper
+        >>> from swarm_mj.radio.mission_radio import radio_of
+        >>> round(radio_of(paper()).power_mw)
+        7967
     """
     power_dbm = transmit_power_dbm(
         mission.range_m, mission.frequency_hz, mission.noise_dbm, mission.sinr_threshold_db
@@ -114,73 +119,62 @@ def mission_radio(
 ) -> MissionRadio:
     """Return a mission's channel, belief and truth.
 
-    A user's own channel takes the place of the mission's. Belief stays that of the mission, and
-    truth is free space, as nothing else is known of such a channel unless it is a table.
+    Args:
+        mission: Whose numbers make them.
+        obstacles: What stands in the scene and takes power from packets.
+        own: A user's channel, which takes the place of the mission's. Belief stays that of the
+            mission, and truth is free space, as nothing else is known of such a channel unless it
+            is a table of gains.
+
+    Returns:
+        The channel, which is to be started if it has a `start`, and the two models of it.
     """
-    radio, belief = radio_of(mission), _belief(mission, obstacles)
-    if own is not None or not (beyond_free_space(mission) or obstacles is not None):
-        channel = radio if own is None else own
+    radio = radio_of(mission)
+    belief = _belief(mission, radio, obstacles)
+    if own is not None:
         known = own if isinstance(own, ComposedChannel) else None  # a table of gains
-        return MissionRadio(channel, belief, TrueLinks(radio=radio, channel=known))
+        return MissionRadio(own, belief, TrueLinks(radio=radio, channel=known))
+    effects: list[Effect] = [*effects_of(mission)]
+    if obstacles is not None:
+        effects.append(Obstruction(obstacles=obstacles))
+    if not effects:
+        return MissionRadio(radio, belief, TrueLinks(radio=radio))
+    model = model_of(radio, mission.num_robots, effects)
     composed = ComposedChannel(
-        _law(mission, radio, obstacles),
-        _reception(mission, radio),
-        shadowing_db=mission.shadowing_db,
-        shadowing_distance_m=mission.shadowing_distance_m,
+        model.law,
+        model.reception,
+        shadowing_db=model.shadowing_db,
+        shadowing_distance_m=model.shadowing_distance_m,
     )
     truth = TrueLinks(radio=radio, channel=composed)
-    if not mission.clocks_differ:
+    if model.clock_offset == 0.0 and model.clock_drift == 0.0:
         return MissionRadio(composed, belief, truth)
-    offset, drift = mission.clock_offset_s / mission.slot_s, 1e-6 * mission.clock_drift_ppm
-    return MissionRadio(AsynchronousChannel(composed, offset, drift), belief, truth)
+    asynchronous = AsynchronousChannel(composed, model.clock_offset, model.clock_drift)
+    return MissionRadio(asynchronous, belief, truth)
 
 
-def _belief(mission: Mission, obstacles: Obstacles | None) -> Belief:
+def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None) -> Belief:
     """Return what the mission grants to know of its channel."""
-    known, belief = None, Belief(radio=radio_of(mission), position_noise_m=mission.position_noise_m)
-    if obstacles is not None and mission.grants("map"):
+    known: list[Effect] = []
+    if mission.grants("statistics"):
+        known.extend(effects_of(mission))
+    if mission.grants("map") and obstacles is not None:
         centre_m = obstacles.centre_m + np.array([mission.map_offset_m, 0.0, 0.0])
-        known = obstacles._replace(centre_m=centre_m)
-    if beyond_free_space(mission) and mission.grants("statistics"):
-        law, reception = _law(mission, belief.radio, known), _reception(mission, belief.radio)
-        shadowing_db = mission.shadowing_db
-        return replace(belief, law=law, reception=reception, shadowing_db=shadowing_db)
-    if known is not None:
-        law = free_space_law(belief.radio.received_at_1_m_mw, mission.num_robots, known)
-        return replace(belief, law=law)
-    return belief
+        known.append(Obstruction(obstacles=obstacles._replace(centre_m=centre_m)))
+    belief = Belief(radio=radio, position_noise_m=mission.position_noise_m)
+    if not known:
+        return belief
+    model = model_of(radio, mission.num_robots, known)
+    return replace(
+        belief, law=model.law, reception=model.reception, shadowing_db=model.shadowing_db
+    )
 
 
 def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:
     """Return a power of each robot's packets where a default radio has this one [mW]."""
     power_mw = np.full(mission.num_robots, default_mw)
-    power_mw[: mission.num_high_power] *= from_db(mission.high_power_db)
-    return power_mw
-
-
-def _law(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None) -> PowerLaw:
-    """Return the law of the mission's mean powers [mW] between these obstacles."""
-    breakpoint_m, exponent = math.inf, FREE_SPACE_EXPONENT
-    if mission.path_loss == "log-distance":  # Rappaport 2002, Eq. 4.69
-        breakpoint_m, exponent = mission.reference_m, mission.loss_exponent
-    elif mission.path_loss == "two-ray":
-        breakpoint_m = two_ray_breakpoint_m(mission.antenna_height_m, mission.frequency_hz)
-        exponent = TWO_RAY_EXPONENT
-    at_1_m_mw = by_robot(mission, radio.received_at_1_m_mw)
-    return PowerLaw(at_1_m_mw, breakpoint_m, exponent, obstacles)
-
-
-def _reception(mission: Mission, radio: FreeSpaceRadio) -> Reception:
-    rician_k = {"none": NO_FADING, "rayleigh": NO_LINE_OF_SIGHT, "rician": mission.rician_k}
-    return Reception(
-        noise_mw=radio.noise_mw,
-        threshold=radio.threshold,
-        rician_k=rician_k[mission.fading],
-        erasure=mission.erasure,
-        burst_begin=mission.burst_begin,
-        burst_end=mission.burst_end,
-        recipient_hears_while_sending=radio.recipient_hears_while_sending,
-    )
+    high_power = HighPower.of(mission)
+    return power_mw if high_power is None else high_power.added_to(power_mw)
 
 
 def _with_chances(links: Links, reception: Reception | None, std_db: float) -> Links:

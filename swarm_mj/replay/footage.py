@@ -7,11 +7,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import components_in
 from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import links as compared
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import Lines, LinkMismatch, LinkRows, PacketPaths, Positions
+from swarm_mj.simulation.components import components_in
 
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
 

@@ -10,12 +10,12 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import components_in
 from swarm_mj.protocol.buffers import NEVER, NO_PARENT
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
 from swarm_mj.replay.footage import Facts, Footage, frame, shown_ground
 from swarm_mj.replay.palette import nice_scale
+from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled

@@ -11,8 +11,8 @@ import numpy as np
 import rerun as rr
 import rerun_bindings as bindings
 
-from swarm_mj.mission.presets import bits_per_second
 from swarm_mj.protocol.packets import BITS_PER_BYTE
+from swarm_mj.radio.words import bits_per_second
 from swarm_mj.replay import charts, palette
 from swarm_mj.replay.footage import frame
 from swarm_mj.replay.layout import draw_legend, layout

@@ -11,7 +11,6 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.control.motion import Controller, controller_of, costed, initial_velocity
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
-from swarm_mj.mission.components import Components, is_ours
 from swarm_mj.mission.placement import connected_positions, draw_survivors
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
@@ -31,8 +30,10 @@ from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowP
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.obstruction import blocked
+from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.localisation import Localisation
 from swarm_mj.system.fields import check_kind, name_of
+from swarm_mj.system.user_code import is_ours
 
 MAX_THREADS = 1024
 MAX_DRAWN_AT_ONCE = 1000  # robots of a team that is drawn anew as a whole until it is connected

@@ -11,10 +11,10 @@ from hypothesis import strategies as st
 from swarm_mj.envs.credit import credits_of, gain, snapshot_channel
 from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.mission import PRESETS, paper, reference
-from swarm_mj.mission.components import Components
 from swarm_mj.protocol.window import window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.simulation.components import Components
 
 
 def random_recipients(rng, shape, share):

@@ -5,8 +5,7 @@ import math
 import pytest
 
 from swarm_mj.mission import PRESETS, WORLDS, paper, reference
-from swarm_mj.mission.presets import bits_per_second, where_flown
-from swarm_mj.physics.arenas import LOSS_DB
+from swarm_mj.physics.arenas import BUILDING
 from swarm_mj.radio.free_space import path_loss_db
 
 TASKS = ["stationary", "random-walk", "flocking"]
@@ -89,26 +88,5 @@ def test_a_block_takes_about_what_umi_loses_without_line_of_sight():
     """At 200 m, 2.4 GHz: 35.3 log10(200) + 22.4 + 21.3 log10(2.4) dB without line of sight."""
     urban = PRESETS["urban"]()
     without_db = 35.3 * math.log10(200.0) + 22.4 + 21.3 * math.log10(2.4)
-    through_db = loss_db(urban, 200.0) + LOSS_DB["building"]
+    through_db = loss_db(urban, 200.0) + BUILDING.loss_db
     assert through_db == pytest.approx(without_db, abs=2.0)
-
-
-def test_where_a_world_is_flown_names_only_what_was_changed():
-    assert where_flown(PRESETS["urban"]()) == ["preset urban"]
-    assert where_flown(PRESETS["urban"](arena="forest")) == ["preset urban", "arena forest"]
-    free = {"path_loss": "free-space", "shadowing_db": 0.0}
-    for given, said in (
-        (free, "fading rician, rician_k 8"),
-        (free | {"fading": "none"}, "free space"),
-    ):
-        assert ", ".join(where_flown(PRESETS["urban"](**given))) == f"preset urban, {said}"
-
-
-def test_errors_of_positions_are_said_where_they_are_flown():
-    noisy = paper(position_noise_m=5.0, position_noise_s=2.0)
-    assert where_flown(noisy) == ["position_noise_m 5, position_noise_s 2"]
-
-
-def test_rates_are_said_with_the_usual_prefix():
-    said = [bits_per_second(rate) for rate in (12.0, 250e3, 1.5e6, 6e9)]
-    assert said == ["12 bit/s", "250 kbit/s", "1.5 Mbit/s", "6 Gbit/s"]

@@ -9,7 +9,6 @@ import pytest
 
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
-from swarm_mj.mission.presets import beyond_free_space
 from swarm_mj.system.fields import kind_of
 
 # As users load it: without the type checks that these tests run under, which would answer first.
@@ -147,27 +146,6 @@ def test_unknown_choices_are_refused(spec):
 def test_a_mission_cannot_change():
     with pytest.raises(FrozenInstanceError):
         paper().num_robots = 3
-
-
-@pytest.mark.parametrize(
-    ("fields", "said"),
-    [
-        ({}, ""),
-        ({"rician_k": 9.0, "burst_end": 0.2, "loss_exponent": 4.0}, ""),  # of parts that are off
-        ({"fading": "rayleigh"}, "fading rayleigh"),
-        ({"fading": "rician", "rician_k": 9.0}, "fading rician, rician_k 9"),
-        ({"path_loss": "two-ray"}, "path_loss two-ray, antenna_height_m 1"),
-        (
-            {"shadowing_db": 6.0, "erasure": 0.1},
-            "shadowing_db 6, shadowing_distance_m 20, erasure 0.1",
-        ),
-        ({"high_power_fraction": 0.25, "num_robots": 8}, "num_high_power 2, high_power_db 6"),
-        ({"high_power_fraction": 0.25, "high_power_db": 0.0}, ""),
-        ({"burst_begin": 0.02}, "burst_begin 0.02, burst_end 0.05"),
-    ],
-)
-def test_what_the_channel_has_beyond_free_space_is_told_in_words(fields, said):
-    assert beyond_free_space(paper(**fields)) == said
 
 
 @pytest.mark.parametrize(

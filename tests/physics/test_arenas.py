@@ -4,13 +4,22 @@ import os
 import re
 from dataclasses import replace
 from itertools import combinations, groupby
+from pathlib import Path
 
 import mujoco
 import numpy as np
 import pytest
 
 from swarm_mj.mission import PRESETS, paper, reference
-from swarm_mj.physics.arenas import ARENAS, DEFAULT_LOSS_DB, OBSTACLE_GROUP, notes_on, obstacles_of
+from swarm_mj.physics.arenas import (
+    ARENAS,
+    DEFAULT_LOSS_DB,
+    MATERIALS,
+    OBSTACLE_GROUP,
+    notes_on,
+    obstacle_geoms,
+    obstacles_of,
+)
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import BOX, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, SPHERE
 from swarm_mj.policies import make_policy
@@ -276,3 +285,31 @@ def test_a_scene_s_infinite_obstacles_are_refused():
 
     with pytest.raises(ValueError, match="infinite"):
         Swarm(paper("stationary", num_robots=3), [1], scene=endless)
+
+
+@pytest.mark.parametrize(("arena", "loss_db"), [("blocks", 25.0), ("forest", 6.0), ("rooms", 3.4)])
+def test_obstacles_of_an_arena_cost_what_their_material_does(arena, loss_db):
+    mission = paper(arena=arena)
+    losses_db = -10.0 * np.log10(obstacles(mission).power_left)
+    np.testing.assert_allclose(losses_db, loss_db)
+    (material,) = [each for each in MATERIALS.values() if each.loss_db == loss_db]
+    shown = compose(mission).material(material.name)
+    np.testing.assert_allclose(shown.rgba, material.rgba)
+
+
+def test_every_obstacle_of_every_arena_has_a_material_whose_loss_is_known():
+    """Without one it would cost 10 dB, in silence."""
+    for arena in WITH_OBSTACLES:
+        model = compose(paper(arena=arena)).compile()
+        named = {model.mat(int(model.geom_matid[g])).name for g in obstacle_geoms(model)}
+        assert named <= MATERIALS.keys()
+
+
+def test_losses_in_the_docs_are_those_of_the_materials():
+    page = (Path(__file__).parents[2] / "docs/channels.md").read_text("utf-8")
+    sentence = page[page.index("the name of its material counts") : page.index("or else 10 dB")]
+    said = re.findall(r"`([a-z ]+)`\s+([\d.]+)", sentence)
+    assert len(said) == 4
+    assert {name: float(loss_db) for name, loss_db in said} == {
+        name: MATERIALS[name].loss_db for name, _ in said
+    }

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.mission.components import Components, digest, make
 from swarm_mj.radio.gain_table import HEADER, GainTable
 from swarm_mj.radio.mission_radio import mission_radio, radio_of
+from swarm_mj.simulation.components import Components, digest
 from swarm_mj.simulation.swarm import Swarm
 
 LIGHT_MPS = 299_792_458.0
@@ -39,8 +39,8 @@ def table(tmp_path):
         path = tmp_path / "gains.csv"
         rows = np.column_stack([ends_m, gain_db])
         np.savetxt(path, rows, delimiter=",", header=HEADER, comments="", fmt="%.10g")
-        channel = make("channel", f"table:{path}", MISSION)
-        assert isinstance(channel, GainTable)
+        channel = GainTable(MISSION, path)
+        assert isinstance(Components(channel=f"table:{path}").made(MISSION).channel, GainTable)
         channel.start(MISSION.num_robots, [np.random.default_rng(0)])
         return channel
 
@@ -123,4 +123,4 @@ def test_what_is_no_table_of_gains_is_refused(tmp_path, text, said):
     with pytest.raises(ValueError, match=r"gains.csv raised ValueError: .*" + said):
         Components(channel=f"table:{path}").made(MISSION)
     with pytest.raises(ValueError, match=r"none.csv cannot be found"):
-        make("channel", f"table:{tmp_path / 'none.csv'}", MISSION)
+        Components(channel=f"table:{tmp_path / 'none.csv'}").made(MISSION)

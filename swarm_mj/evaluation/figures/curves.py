@@ -11,7 +11,7 @@ from jaxtyping import Float
 from swarm_mj.evaluation.published import OPTIONS, ResultFigure, points
 from swarm_mj.evaluation.results import Result, carries_more, config_of
 from swarm_mj.mission import PAPERS
-from swarm_mj.mission.components import CALLED_WITH
+from swarm_mj.simulation.components import CALLED_WITH
 from swarm_mj.system.fields import as_typed
 
 # A figure compares policies, so all else is the same.

@@ -3,11 +3,11 @@
 from collections.abc import Collection
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.components import FORM, load
 from swarm_mj.policies.gnn.buffer_features import BufferFeatures
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
 from swarm_mj.system.fields import did_you_mean
+from swarm_mj.system.user_code import FORM, load
 
 FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
     "paper": PaperFeatures,

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int, Int16
 from PIL import ImageFont
 from PIL.ImageDraw import ImageDraw
 
-from swarm_mj.mission.presets import where_flown
+from swarm_mj.radio.words import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import DASHES, WHOLE

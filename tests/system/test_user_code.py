@@ -1,4 +1,4 @@
-"""Users' components, by name: what is loaded, how it is called, and errors in one line."""
+"""Users' code, by name: what is loaded, how it is called, and errors in one line."""
 
 import json
 import sys
@@ -6,15 +6,7 @@ import sys
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.mission.components import (
-    Components,
-    components_in,
-    digest,
-    is_ours,
-    load,
-    make,
-    one_line_each,
-)
+from swarm_mj.system.user_code import file_of, is_ours, load, make, one_line_each
 
 MISSION = paper(num_robots=3)
 PARTS = '''
@@ -109,29 +101,6 @@ def test_what_takes_a_mission_is_given_it(name, made_with):
 def test_what_takes_two_arguments_is_the_component_itself(name):
     found = make("channel", f"own_parts:{name}", MISSION)
     assert found is getattr(sys.modules["own_parts"], name)
-    assert Components(channel=f"own_parts:{name}").made(MISSION).channel is found
-
-
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("number", "must be a function, or an object like one, not 7"),
-        ("maker", "must be a function, or an object like one, not <"),
-        ("given_three", r"is called with \(position_m, recipient\), but this one takes"),
-    ],
-)
-def test_components_must_be_functions_or_like_them(name, said):
-    with pytest.raises(ValueError, match=rf"^channel own_parts:{name}: a? ?channel {said}"):
-        Components(channel=f"own_parts:{name}").made(MISSION)
-    assert callable(Components(channel="own_parts:Plain").made(MISSION).channel)
-
-
-def test_names_are_those_typed_or_of_the_objects():
-    components = Components(channel="my:Radio", controller=json.dump, scene=json.JSONDecoder.decode)
-    names = {"channel": "my:Radio", "controller": "dump", "scene": "decode"}
-    assert components.names == names
-    assert components_in(names | {"seed": 3, "policy": "mst"}).given == names
-    assert components.title == ", channel my:Radio, controller dump, scene decode"
 
 
 def test_only_the_packages_own_components_get_live_arrays():
@@ -193,22 +162,7 @@ def test_errors_of_others_are_left_alone():
         json.loads("x")
 
 
-def test_a_digest_changes_with_the_file(parts):
+def test_the_file_of_loaded_code_is_known(parts):
+    assert file_of("own_parts:plain") is None  # so far
     load("channel", "own_parts:plain")
-    before = digest("own_parts:plain")
-    with (parts / "own_parts.py").open("a") as file:
-        file.write("\n# another line\n")
-    assert digest("own_parts:plain") != before
-
-
-@pytest.mark.parametrize(
-    ("component", "said"),
-    [
-        ({"controller": lambda states: states}, r"a controller is called with \(buffers, states\)"),
-        ({"channel": lambda: 0}, r"a channel is called with \(position_m, recipient\), but"),
-        ({"scene": lambda _spec: None}, r"a scene is called with \(spec, mission\)"),
-    ],
-)
-def test_components_that_take_other_arguments_are_refused(component, said):
-    with pytest.raises(TypeError, match=said):
-        Components(**component)
+    assert file_of("own_parts:plain") == parts / "own_parts.py"

@@ -1,0 +1,107 @@
+"""A mission's channel, controller and scene: its own, a user's objects, or their names."""
+
+import hashlib
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from swarm_mj.mission import Mission
+from swarm_mj.radio.effects import beyond_free_space
+from swarm_mj.radio.gain_table import GainTable
+from swarm_mj.system.fields import check_callable, name_of, setting
+from swarm_mj.system.user_code import call, file_of, make
+
+GROUP, SHOWN_AS = "your own parts, each by module:Name", "MODULE:NAME"
+OWN = {"group": GROUP, "metavar": SHOWN_AS, "convert": str}
+CALLED_WITH = {  # the kinds of components, and the arguments of each
+    "channel": ("position_m", "recipient"),
+    "controller": ("buffers", "states"),
+    "scene": ("spec", "mission"),
+}
+TABLE = "table:"  # begins the name of a channel that is a table of gains
+
+
+@dataclass(frozen=True, kw_only=True)
+class Components:
+    """A mission's channel, controller and scene: objects or names; None is the mission's own.
+
+    Raises TypeError for what is neither a name nor called as its kind is.
+    """
+
+    # Any admits objects; files and command lines hold names only.
+    channel: Any = setting(None, "who decodes whom; or table:FILE", shown="free space", **OWN)
+    controller: Any = setting(None, "what drives the robots", shown="the task's", **OWN)
+    scene: Any = setting(None, "a function that adds obstacles", shown="none", **OWN)
+
+    def __post_init__(self) -> None:
+        for kind, component in self.given.items():
+            # A channel that varies from slot to slot is asked for each slot's, not called.
+            if not isinstance(component, str) and not hasattr(component, "at"):
+                check_callable(kind, component, CALLED_WITH[kind])
+
+    @property
+    def given(self) -> dict[str, Any]:
+        """Those that are not the mission's own, by their kind."""
+        every = {"channel": self.channel, "controller": self.controller, "scene": self.scene}
+        return {kind: component for kind, component in every.items() if component is not None}
+
+    @property
+    def names(self) -> dict[str, str]:
+        """The names of those given; of an object, its function's or its class's."""
+        names: dict[str, str] = {}
+        for kind, component in self.given.items():
+            names[kind] = component if isinstance(component, str) else name_of(component)
+        return names
+
+    @property
+    def title(self) -> str:
+        """The end of a flight's title."""
+        return "".join(f", {kind} {name}" for kind, name in self.names.items())
+
+    def made(self, mission: Mission) -> "Components":
+        """Return objects in place of names.
+
+        Args:
+            mission: What they are made for.
+
+        Returns:
+            The components; what was an object is the same object.
+
+        Raises:
+            ValueError: One cannot be loaded or made, is not called as its kind is, or is a channel
+                that takes the place of effects that the mission asks for.
+        """
+        made = self
+        for kind, name in self.given.items():
+            if not isinstance(name, str):
+                continue
+            if kind == "channel" and beyond_free_space(mission):
+                raise ValueError(
+                    f"channel {name} takes the place of the mission's own, so "
+                    f"{beyond_free_space(mission)} would change nothing; leave out one of them"
+                )
+            try:
+                made = replace(made, **{kind: _made(kind, name, mission)})
+            except TypeError as error:
+                raise ValueError(f"{kind} {name}: {error}") from error
+        return made
+
+
+def components_in(config: Mapping[str, Any]) -> Components:
+    """Return the components that a flight's configuration or a result names."""
+    return Components(**{kind: config[kind] for kind in CALLED_WITH if config.get(kind)})
+
+
+def digest(name: str) -> str:
+    """Return a hash of the table, or of the file of loaded code; empty if there is none."""
+    file = Path(name.removeprefix(TABLE)) if name.startswith(TABLE) else file_of(name)
+    return hashlib.sha256(file.read_bytes()).hexdigest()[:12] if file else ""
+
+
+def _made(kind: str, name: str, mission: Mission) -> object:
+    if kind == "channel" and name.startswith(TABLE):
+        table = partial(GainTable, path=Path(name.removeprefix(TABLE)))
+        return call(kind, name, table, mission)
+    return make(kind, name, mission)

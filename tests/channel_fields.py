@@ -1,0 +1,26 @@
+"""The mission's numbers of the channel, what they count with, and values that are not usual."""
+
+from dataclasses import fields
+
+from swarm_mj.mission import Mission
+from swarm_mj.mission.presets import NEEDED
+from swarm_mj.mission.specification import CHANNEL
+
+SPECS = {spec.name: spec for spec in fields(Mission)}
+CHANNEL_FIELDS = [name for name, spec in SPECS.items() if spec.metadata.get("group") == CHANNEL]
+
+
+def other_values(name):
+    """Values of a field besides its default: every other choice, or one between its bounds."""
+    spec = SPECS[name]
+    if "choices" in spec.metadata:
+        return [choice for choice in spec.metadata["choices"] if choice != spec.default]
+    return [0.5 * (spec.metadata["low"] + spec.metadata["high"])]
+
+
+def counting(name):
+    """The fields of a mission in which a number counts."""
+    if name not in NEEDED:
+        return {}
+    effect, state = NEEDED[name]
+    return {effect: state or other_values(effect)[0]}
