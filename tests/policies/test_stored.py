@@ -16,6 +16,7 @@ from safetensors.numpy import load_file, save_file
 from tiny_policies import FEATURES, save_tiny, tiny_config, tiny_network
 
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.policy_config import MlpConfig, MlpShape, model_card
 from swarm_mj.policies.stored import (
     find_policy,
@@ -101,8 +102,14 @@ def test_a_policy_is_one_file_that_others_can_read(policy):
     weights = {name: tensor.numpy() for name, tensor in tiny_network().state_dict().items()}
     np.testing.assert_equal(load_file(written), weights)
     said, config = json.loads(metadata_of(written)["swarm_mj policy"]), tiny_config(tiny_network())
-    header = {"format": "swarm_mj policy", "format_version": 2, "kind": "gnn"}
-    assert said == header | {"config": asdict(config), "card": model_card(config)}
+    assert said == {
+        "format": "swarm_mj policy",
+        "format_version": 3,
+        "kind": "gnn",
+        "feature_names": list(FEATURES_OF_1_0["extended"]),
+        "config": asdict(config),
+        "card": model_card(config),
+    }
 
 
 def test_a_policy_is_the_same_bytes_every_time_and_loading_draws_no_numbers(policy):
@@ -242,7 +249,7 @@ def network_with(**its):
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        (lambda s: s.update(format_version=3), "format_version is 3, and this .* reads 2; update"),
+        (lambda s: s.update(format_version=4), "format_version is 4, and this .* reads 3; update"),
         (lambda s: s.update(kind="cnn"), "Invalid enum value 'cnn'"),
         (lambda s: s.update(kind="gnn"), "missing required field|unknown field"),
         (lambda s: s.update(wings=2), "unknown field `wings`"),
