@@ -22,7 +22,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     III-A   Eq. 12  mean aggregation         policies.gnn.network.mean_aggregation
     III-A   Eq. 13  non-linear updates       policies.gnn.network.Core
     III-A   Eq. 14  Aggregation GNN          policies.gnn.network.AggregationGnn
-    III-C           decisions                policies.gnn.policy.recipient_logits
+    III-C           decisions                policies.gnn.decisions.recipient_logits
     III-C           PPO                      learning.ppo.make_model
     III-C           the training loop        learning.train.TrainingSession.learn
     IV-A    Eq. 15  dynamics                 physics.worlds.Physics.step

@@ -17,9 +17,9 @@ from torch import Tensor
 
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import Device, PpoSettings, Training
+from swarm_mj.policies.gnn.decisions import recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
 from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.gnn.policy import recipient_logits
 
 CPU = torch.device("cpu")
 

@@ -1,6 +1,6 @@
 """Policies whose robots evaluate a trained network (III-C): their common base, and perceptrons.
 
-`gnn.policy` has the Aggregation GNN, which needs torch and flies teams of any size.
+`gnn.policy` has the Aggregation GNN, which flies teams of any size, and needs torch to.
 """
 
 import hashlib

@@ -3,7 +3,6 @@
 import itertools
 import json
 from dataclasses import asdict, dataclass
-from pathlib import Path
 from typing import Any, Literal, get_args
 
 import numpy as np
@@ -12,7 +11,6 @@ from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features
 from swarm_mj.system.fields import check, setting
 
 SUFFIX = ".safetensors"  # of a stored policy's file
-CARD = Path(__file__).with_name("card.md")
 Edges = Literal["paper", "reference", "both"]
 Activation = Literal["tanh", "relu"]
 Weights = dict[str, np.ndarray]  # by name
@@ -46,6 +44,25 @@ class GnnShape:
         """True if there is a GN block with something to learn."""
         return self.receptive_field > 0 and not self.is_linear
 
+    @property
+    def tensors(self) -> dict[str, tuple[int, ...]]:
+        """The weights' shapes by name: weights are [Out, In], biases [Out]."""
+        num_inputs = {"encoder.node": self.num_features, "decoder.node": self.latent}
+        if self.has_core:
+            num_inputs["encoder.edge"] = 1
+            num_inputs["core.edge"] = 3 * self.latent
+            num_inputs["core.node"] = 2 * self.latent
+        shapes: dict[str, tuple[int, ...]] = {}
+        for perceptron, first in num_inputs.items():
+            for layer in range(self.depth):
+                before = first if layer == 0 else self.latent
+                shapes[f"{perceptron}.{layer}.weight"] = (self.latent, before)
+                shapes[f"{perceptron}.{layer}.bias"] = (self.latent,)
+        stages = self.receptive_field + 1
+        shapes["output.weight"] = (self.num_outputs, stages * self.latent)
+        shapes["output.bias"] = (self.num_outputs,)
+        return shapes
+
 
 @dataclass(frozen=True, kw_only=True)
 class MlpShape:
@@ -66,9 +83,11 @@ class MlpShape:
     def tensors(self) -> dict[str, tuple[int, ...]]:
         """The weights' shapes by name: `0.weight` [Out, In] and `0.bias` [Out] first."""
         widths = [self.num_robots * (1 + self.num_features), *self.hidden, self.num_robots]
-        layers = list(enumerate(itertools.pairwise(widths)))
-        weights = {f"{n}.weight": (after, before) for n, (before, after) in layers}
-        return weights | {f"{n}.bias": (after,) for n, (_, after) in layers}
+        shapes: dict[str, tuple[int, ...]] = {}
+        for layer, (before, after) in enumerate(itertools.pairwise(widths)):
+            shapes[f"{layer}.weight"] = (after, before)
+            shapes[f"{layer}.bias"] = (after,)
+        return shapes
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -131,11 +150,21 @@ def model_card(config: GnnConfig | MlpConfig) -> str:
         flags.append(f"--robots {config.network.num_robots}")
     if is_own_set(config.features):
         flags.append(f"--features {config.features}")
-    return CARD.read_text(encoding="utf-8").format(
-        kind=kind,
-        features=config.features,
-        flags=" ".join(flags),
-        suffix=SUFFIX,
-        teams=teams,
-        config=json.dumps(asdict(config), indent=2),
-    )
+    return f"""\
+# A learned communication policy of swarm_mj
+
+Every robot evaluates {kind} on the `{config.features}` features of its own
+buffer, and draws from the result which robot it addresses in the next window, or that it stays
+silent. Packets carry T, M and P, as the paper's, and nothing more.
+
+    swarm-mj fly --policy FILE --task {" ".join(flags)}
+
+`FILE` is the `{SUFFIX}` file that holds this card; `swarm-mj evaluate` takes it too.
+{teams}
+
+```json
+{json.dumps(asdict(config), indent=2)}
+```
+
+Licence: Apache-2.0, as swarm_mj.
+"""

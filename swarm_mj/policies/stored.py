@@ -1,12 +1,14 @@
 """A policy on disk: one `.safetensors` file of weights, whose metadata says what they belong to.
 
 Nothing in such a file is code: no pickle, no name that would be imported. The metadata has one
-entry, JSON, of the format, its version, the kind of the network, the config and the card.
+entry, JSON, of the format, its version, the kind of the network, the names of its features in
+order, the config and the card.
 """
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
@@ -17,17 +19,19 @@ from safetensors.numpy import save
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import feature_sets
+from swarm_mj.policies.gnn.policy import GnnPolicy, StoredGnn
 from swarm_mj.policies.learned import LearnedPolicy, MlpPolicy
 from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, Weights, model_card
 from swarm_mj.system.packages import need
 from swarm_mj.system.reading import check_size, open_file, read_document, read_plain
 from swarm_mj.system.writing import write_bytes
 
-if TYPE_CHECKING:  # a plain network flies without torch, so functions import it
+if TYPE_CHECKING:  # policies are loaded without torch, which takes seconds to import
     from swarm_mj.policies.gnn.network import AggregationGnn
 
 POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
-FORMAT, VERSION = "swarm_mj policy", 2  # and the metadata's entry; version 1 was a folder
+FORMAT = "swarm_mj policy"  # and the metadata's entry
+VERSION = 3  # 2, of swarm_mj 1.0.0, did not name the features
 CONFIGS = {"gnn": GnnConfig, "mlp": MlpConfig}
 MAX_BYTES = 64_000_000
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
@@ -38,12 +42,42 @@ class _Metadata:
     kind: Literal["gnn", "mlp"]
     config: dict[str, Any]
     card: str
+    feature_names: tuple[str, ...]  # in order; none in files of 1.0.0
+
+    @property
+    def feature_set(self) -> str:
+        """The name of the feature set, or "" for a config that has none, and so is unsound."""
+        network = self.config.get("network")
+        inner = network.get("features") if isinstance(network, dict) else None
+        features = self.config.get("features", inner)
+        return features if isinstance(features, str) else ""
 
 
 def save_gnn(
     path: Path, network: "AggregationGnn", config: GnnConfig, card: str | None = None
 ) -> Path:
-    """Store a GNN, as `save_weights` does."""
+    """Store a GNN whole or not at all.
+
+    Args:
+        path: The file, which replaces one of that name; `.safetensors` is appended unless it ends
+            so.
+        network: Its weights, on any device.
+        config: Its shape, the feature set that it was trained on, and its origin.
+        card: A text in Markdown that the file holds, too; `model_card` of the config unless given.
+
+    Returns:
+        The file.
+
+    Raises:
+        ValueError: `load_policy` would not take the weights, the config is no JSON, or the file
+            would be too large.
+        TypeError: The config is no JSON.
+        OSError: The file cannot be written.
+
+    Example:
+        >>> save_gnn(Path("mine"), network, config)
+        PosixPath('mine.safetensors')
+    """
     weights = {name: t.detach().cpu().numpy() for name, t in network.state_dict().items()}
     return save_weights(path, weights, config, card)
 
@@ -51,20 +85,20 @@ def save_gnn(
 def save_weights(
     path: Path, weights: Weights, config: GnnConfig | MlpConfig, card: str | None = None
 ) -> Path:
-    """Store a policy, whole or not at all; return its file, which replaces one of that name.
-
-    `.safetensors` is appended unless the path ends so. The card, in Markdown, is `model_card` of
-    the config unless given. Raises ValueError for weights that `load_policy` would not take, or a
-    file too large, TypeError or ValueError for a config that is no JSON, OSError if the file cannot
-    be written.
-    """
+    """Store a policy's weights by name, as `save_gnn` does; it returns and raises the same."""
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
-    _check_tensors(config, path, weights)
-    (kind,) = (name for name, its in CONFIGS.items() if isinstance(config, its))
-    said = {"format": FORMAT, "format_version": VERSION, "kind": kind, "config": asdict(config)}
-    text = json.dumps(said | {"card": card or model_card(config)}, allow_nan=False)
+    _check_tensors(config.network.tensors, weights)
+    said = {
+        "format": FORMAT,
+        "format_version": VERSION,
+        "kind": "gnn" if isinstance(config, GnnConfig) else "mlp",
+        "feature_names": feature_sets.known_names(config.features),
+        "config": asdict(config),
+        "card": card or model_card(config),
+    }
+    tensors = {name: np.ascontiguousarray(weight) for name, weight in weights.items()}
     # In one entry: safetensors would write several in another order every time.
-    data = save({n: np.ascontiguousarray(w) for n, w in weights.items()}, {FORMAT: text})
+    data = save(tensors, {FORMAT: json.dumps(said, allow_nan=False)})
     check_size(path.name, len(data), MAX_BYTES)
     write_bytes(path, data)
     return path
@@ -73,39 +107,66 @@ def save_weights(
 def load_policy(
     path: Path, mission: Mission, *, is_deterministic: bool = False, features: Sequence[str] = ()
 ) -> LearnedPolicy:
-    """Return a policy, ready to fly a mission, which may be of another kind than it was trained on.
+    """Return a stored policy, ready to fly.
 
-    The mission's area, duration and range normalise what the robots see. A deterministic policy
-    takes the most probable recipient instead of a draw. Users' own feature sets are imported only
-    if their names, as `module:Name`, are among `features`: a policy cannot make us run code. Errors
-    are those of `read_weights`, and ValueError if it flies teams of another size, or its features
-    are none that may be imported, or now have another number.
+    Args:
+        path: Its file, with or without `.safetensors`, or the folder of a run.
+        mission: What it flies, which may be of another kind than it was trained on. Its area,
+            duration and range normalise what the robots see.
+        is_deterministic: Whether robots take the most probable recipient instead of a draw.
+        features: Users' own feature sets, as `module:Name`, that may be imported. A policy names
+            the one it was trained on, but only the user can make us run code.
+
+    Returns:
+        The policy; a graph neural network imports torch when it flies first.
+
+    Raises:
+        ValueError: There is no policy; it is damaged, foreign, oversized or of a newer version; it
+            flies teams of another size; its features are a user's own and not among `features`; or
+            they are other ones now, or in another order, than it was trained on.
+        ModuleNotFoundError: It is a graph neural network, and torch is not installed.
+        OSError: It cannot be read.
+
+    Example:
+        >>> policy = load_policy(Path("runs/mine"), paper("random-walk", num_robots=20))
+        >>> run = swarm_mj.fly("random-walk", policy=policy, num_robots=20)
     """
-    weights, config = read_weights(path)
-    size = config.network.num_robots if isinstance(config, MlpConfig) else mission.num_robots
-    if mission.num_robots != size:
+    weights, config, feature_names = _read(path)
+    if isinstance(config, MlpConfig) and mission.num_robots != config.network.num_robots:
+        size = config.network.num_robots
         raise ValueError(
             f"policy {path} flies teams of {size} robots, for which it was trained, not "
             f"{mission.num_robots}; choose --robots {size}"
         )
-    seen, num_trained_on = config.features, config.network.num_features
-    feature_sets.check_named(seen, features, f"policy {path}")
-    own = seen if feature_sets.is_own_set(seen) else ""
-    if own:
+    seen = config.features
+    own = ""
+    if feature_sets.is_own_set(seen):
+        own = seen
+        feature_sets.check_named(own, features, f"policy {path}")
         feature_sets.load_features(own)
-    if (num := feature_sets.num_features(seen)) != num_trained_on:
+        feature_sets.check_unchanged(own, feature_names, f"policy {path}")
+    num_trained_on = config.network.num_features
+    if (num := feature_sets.num_features(seen)) != num_trained_on:  # in files of 1.0.0
         raise ValueError(
             f"policy {path} was trained on {num_trained_on} features, and {seen} now has {num}"
         )
     extractor = feature_sets.make_extractor(seen, mission)
-    options: Any = {"is_deterministic": is_deterministic, "own_features": own}
     if isinstance(config, MlpConfig):
-        return MlpPolicy(config.network, weights, extractor, **options)
-    from swarm_mj.policies.gnn.fast import network_of
-    from swarm_mj.policies.gnn.policy import GnnPolicy
-
-    network = network_of(config.network, weights)
-    return GnnPolicy(network, extractor, config.silence_logit, **options)
+        return MlpPolicy(
+            config.network,
+            weights,
+            extractor,
+            is_deterministic=is_deterministic,
+            own_features=own,
+        )
+    need("torch", f"policy {path}", "fly another")
+    return GnnPolicy(
+        StoredGnn(shape=config.network, weights=weights),
+        extractor,
+        config.silence_logit,
+        is_deterministic=is_deterministic,
+        own_features=own,
+    )
 
 
 def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
@@ -122,19 +183,36 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
     """Return a policy's weights, each of them checked, and its config.
 
     Raises ValueError if there is no policy, or it is damaged, foreign, oversized or of a newer
-    version, OSError if it cannot be read.
+    version, or our features are others now or in another order, OSError if it cannot be read.
     """
+    weights, config, _ = _read(path)
+    return weights, config
+
+
+def _read(path: Path) -> tuple[Weights, GnnConfig | MlpConfig, tuple[str, ...]]:
+    """Return a policy's weights, its config and the names of its features."""
     place = find_policy(path)
-    try:
+    with _as_unsound(place):
         weights, metadata = _read_tensors(place)
         if FORMAT not in metadata:
             raise ValueError("it has weights, but does not say of which policy")
-        said = read_document(metadata[FORMAT], FORMAT, VERSION, _Metadata)
+        document: dict[str, Any] = read_document(metadata[FORMAT], FORMAT, VERSION, dict)
+        said = read_plain({"feature_names": (), **document}, _Metadata)
+    # Before the config, whose number of features would say less.
+    feature_sets.check_unchanged(said.feature_set, said.feature_names, f"policy {place}")
+    with _as_unsound(place):
         config = read_plain(said.config, CONFIGS[said.kind])
-        _check_tensors(config, path, weights)
+        _check_tensors(config.network.tensors, weights)
+    return weights, config, said.feature_names
+
+
+@contextmanager
+def _as_unsound(place: Path) -> Iterator[None]:
+    """Let a ValueError name the policy and the way out."""
+    try:
+        yield
     except ValueError as error:
         raise ValueError(f"policy {place}: {error}; {WAY_OUT}") from error
-    return weights, config
 
 
 def find_policy(path: Path) -> Path:
@@ -163,22 +241,17 @@ def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
 
 
-def _check_tensors(config: GnnConfig | MlpConfig, path: Path, tensors: Weights) -> None:
+def _check_tensors(shapes: dict[str, tuple[int, ...]], tensors: Weights) -> None:
     """Raise ValueError unless these are a network's tensors, single-precision and finite."""
-    if isinstance(config, MlpConfig):
-        shapes = config.network.tensors
-    else:
-        need("torch", f"policy {path}", "fly another")
-        from swarm_mj.policies.gnn.fast import empty_network
-
-        shapes = {n: tuple(x.shape) for n, x in empty_network(config.network).state_dict().items()}
     for name in sorted(shapes.keys() ^ tensors.keys()):
         known = "lacks the" if name in shapes else "has an unknown"
         raise ValueError(f"it {known} tensor {name:.80}")
     for name, tensor in tensors.items():
-        given, wanted = (tensor.shape, tensor.dtype), (shapes[name], np.float32)
-        if given != wanted:
-            must, found = (f"{list(shape)} of {np.dtype(kind)}" for shape, kind in (wanted, given))
-            raise ValueError(f"tensor {name} must be {must}, not {found}")
+        shape = shapes[name]
+        if tensor.shape != shape or tensor.dtype != np.float32:
+            raise ValueError(
+                f"tensor {name} must be {list(shape)} of float32, not {list(tensor.shape)} of "
+                f"{tensor.dtype}"
+            )
         if not np.all(np.isfinite(tensor)):
             raise ValueError(f"tensor {name} has numbers that are not finite")

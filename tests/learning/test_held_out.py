@@ -16,7 +16,7 @@ from swarm_mj.learning.held_out import (
     notes_of,
     reference_columns,
 )
-from swarm_mj.learning.selection import Choice, Cost
+from swarm_mj.learning.selection import MAX_MISSIONS, Choice, Cost
 from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.rollout import rollout, summarise
@@ -130,6 +130,37 @@ def test_the_least_cost_on_fresh_missions_is_chosen_and_told_on_others():
         assert cost.mean == pytest.approx(other.mean())
         assert cost.behind == pytest.approx(behind.mean())
         assert cost.behind_sem == pytest.approx(behind.std(ddof=1) / np.sqrt(3))
+
+
+def test_finalists_are_judged_and_the_kept_one_told_on_fresh_missions(monkeypatch):
+    """No mission of the evaluations chooses, and none that chose tells the cost."""
+    seeds = []
+    fly = Flights.fly
+
+    def noted(flights, policy_of, first_seed, num_missions):
+        seeds.append(set(range(first_seed, first_seed + num_missions)))
+        return fly(flights, policy_of, first_seed, num_missions)
+
+    monkeypatch.setattr(Flights, "fly", noted)
+    evaluate(TRAINING, NETWORK)
+    (evaluated,) = seeds
+    seeds.clear()
+    choose(TRAINING, CURVE, NETWORKS, lambda _share: None)
+    chose = seeds[: len(CURVE)]
+    told = seeds[len(CURVE) :]
+    assert all(each == chose[0] for each in chose)
+    assert all(each == told[0] for each in told)
+    assert not evaluated & chose[0]
+    assert not evaluated & told[0]
+    assert not chose[0] & told[0]
+
+
+def test_the_largest_flights_do_not_reach_the_next_ones_missions():
+    """Nor those that training draws, from 2^40 on."""
+    evaluations = range(HELD_OUT_SEED, HELD_OUT_SEED + 10_000)  # the most that may be held out
+    assert evaluations.stop <= CHOICE_SEED
+    assert CHOICE_SEED + max(10_000, MAX_MISSIONS) <= TEST_SEED
+    assert TEST_SEED + max(10_000, MAX_MISSIONS) <= 2**40
 
 
 def test_the_first_flies_beside_what_was_chosen_if_it_is_another():

@@ -1,5 +1,6 @@
 """What a config says, everything that is none, and the card that says it in words."""
 
+import itertools
 import json
 import math
 from dataclasses import asdict, replace
@@ -7,6 +8,7 @@ from dataclasses import asdict, replace
 import pytest
 from tiny_policies import FEATURES, tiny_config, tiny_network
 
+from swarm_mj.policies.gnn.fast import empty_network
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape, MlpConfig, MlpShape, model_card
 from swarm_mj.system.reading import read_json
 
@@ -114,3 +116,20 @@ def test_a_shape_refuses_what_is_out_of_range(kind, its, complaint):
 def test_only_a_block_that_is_applied_and_not_linear_learns(receptive_field, is_linear, has_core):
     shape = GnnShape(num_features=3, receptive_field=receptive_field, is_linear=is_linear)
     assert shape.has_core == has_core
+
+
+SHAPES = list(itertools.product((1, 2, 3), (0, 1, 4), (False, True), (1, 2)))
+
+
+@pytest.mark.parametrize(("depth", "receptive_field", "is_linear", "num_outputs"), SHAPES)
+def test_a_shape_knows_its_tensors_without_torch(depth, receptive_field, is_linear, num_outputs):
+    shape = GnnShape(
+        num_features=3,
+        num_outputs=num_outputs,
+        latent=5,
+        depth=depth,
+        receptive_field=receptive_field,
+        is_linear=is_linear,
+    )
+    state = empty_network(shape).state_dict()
+    assert shape.tensors == {name: tuple(tensor.shape) for name, tensor in state.items()}

@@ -16,6 +16,9 @@ from safetensors.numpy import load_file, save_file
 from tiny_policies import FEATURES, save_tiny, tiny_config, tiny_network
 
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
+from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
+from swarm_mj.policies.gnn.graphs import PaperFeatures
 from swarm_mj.policies.policy_config import MlpConfig, MlpShape, model_card
 from swarm_mj.policies.stored import (
     find_policy,
@@ -25,6 +28,7 @@ from swarm_mj.policies.stored import (
     save_gnn,
     save_weights,
 )
+from swarm_mj.system.packages import asset
 
 MISSION = paper("stationary", num_robots=3)
 SEEN = {"num_robots": 3, "features": "paper", "num_features": 8}
@@ -101,8 +105,14 @@ def test_a_policy_is_one_file_that_others_can_read(policy):
     weights = {name: tensor.numpy() for name, tensor in tiny_network().state_dict().items()}
     np.testing.assert_equal(load_file(written), weights)
     said, config = json.loads(metadata_of(written)["swarm_mj policy"]), tiny_config(tiny_network())
-    header = {"format": "swarm_mj policy", "format_version": 2, "kind": "gnn"}
-    assert said == header | {"config": asdict(config), "card": model_card(config)}
+    assert said == {
+        "format": "swarm_mj policy",
+        "format_version": 3,
+        "kind": "gnn",
+        "feature_names": list(FEATURES_OF_1_0["extended"]),
+        "config": asdict(config),
+        "card": model_card(config),
+    }
 
 
 def test_a_policy_is_the_same_bytes_every_time_and_loading_draws_no_numbers(policy):
@@ -138,6 +148,74 @@ def test_a_plain_network_flies_teams_of_its_size_alone_and_is_none_to_train_on(p
         load_policy(plain, paper("stationary", num_robots=5))
     with pytest.raises(ValueError, match=r"plain\.safetensors is a plain network; name one"):
         read_policy(plain)
+
+
+# The features that a policy was trained on.
+
+
+def as_of_1_0(path):
+    """The file as version 1.0.0 wrote it, without the names of its features."""
+
+    def change(said):
+        del said["feature_names"]
+        said["format_version"] = 2
+
+    rewritten(path, change_metadata=change)
+
+
+@pytest.mark.parametrize("features", FEATURES)
+def test_files_of_1_0_fly_as_those_that_name_their_features(tmp_path, features):
+    save_tiny(tmp_path / "x", features)
+    now = load_policy(tmp_path / "x", MISSION)
+    as_of_1_0(tmp_path / "x.safetensors")
+    assert load_policy(tmp_path / "x", MISSION).parameters == now.parameters
+
+
+@pytest.mark.parametrize("is_old", [False, True])
+def test_features_in_another_order_are_refused(policy, monkeypatch, is_old):
+    """The network would fly, and worse, without a word."""
+    if is_old:
+        as_of_1_0(policy)
+    names = ExtendedFeatures.names
+    monkeypatch.setattr(ExtendedFeatures, "names", (*names[:2], names[3], names[2], *names[4:]))
+    refused(policy, 'features: number 3 of them was "age of T" and is "distance" now; fly it with')
+
+
+def test_one_feature_more_is_refused_by_its_name_and_not_by_a_number(policy, monkeypatch):
+    monkeypatch.setattr(ExtendedFeatures, "names", (*ExtendedFeatures.names, "battery"))
+    refused(policy, 'number 19 of them was nothing and is "battery" now')
+
+
+def test_a_plain_network_keeps_the_names_of_its_features_too(plain, monkeypatch):
+    monkeypatch.setattr(PaperFeatures, "names", PaperFeatures.names[::-1])
+    refused(plain, 'other paper features: number 1 of them was "is oneself" and is "L" now')
+
+
+def test_the_shipped_policy_names_its_features():
+    said = json.loads(metadata_of(asset("policies/gnn.safetensors"))["swarm_mj policy"])
+    assert tuple(said["feature_names"]) == FEATURES_OF_1_0["extended"]
+    policy = load_policy(asset("policies/gnn.safetensors"), MISSION)
+    assert policy.parameters["digest"] == "44a1592c564a"  # that of 1.0.0
+
+
+def test_a_gnn_is_loaded_without_torch_until_it_flies(policy):
+    code = (
+        "import sys; from pathlib import Path; import swarm_mj; "
+        "from swarm_mj.policies.stored import load_policy; "
+        f"policy = load_policy(Path({str(policy)!r}), swarm_mj.paper(num_robots=3)); "
+        "print(policy.parameters['digest'], 'torch' in sys.modules); "
+        "swarm_mj.fly(policy=policy, num_robots=3, num_windows=2, record=False); "
+        "print(policy.parameters['digest'], 'torch' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    digest = load_policy(policy, MISSION).parameters["digest"]
+    assert done.stdout.split() == [digest, "False", digest, "True"]
+
+
+def test_a_gnn_without_torch_says_what_to_install(policy, monkeypatch):
+    monkeypatch.setitem(sys.modules, "torch", None)
+    with pytest.raises(ModuleNotFoundError, match=r"policy .*mine\.safetensors needs torch.*fly"):
+        load_policy(policy, MISSION)
 
 
 # What is no policy.
@@ -242,7 +320,7 @@ def network_with(**its):
 @pytest.mark.parametrize(
     ("change", "complaint"),
     [
-        (lambda s: s.update(format_version=3), "format_version is 3, and this .* reads 2; update"),
+        (lambda s: s.update(format_version=4), "format_version is 4, and this .* reads 3; update"),
         (lambda s: s.update(kind="cnn"), "Invalid enum value 'cnn'"),
         (lambda s: s.update(kind="gnn"), "missing required field|unknown field"),
         (lambda s: s.update(wings=2), "unknown field `wings`"),

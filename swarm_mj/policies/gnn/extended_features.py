@@ -4,15 +4,14 @@ From its own buffer, the packets it sent and decoded, its identity, the team's s
 """
 
 import math
-import tomllib
 from dataclasses import replace
-from pathlib import Path
-from typing import ClassVar
+from typing import Annotated, ClassVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.policies.gnn.features import Feature, dtype_of, features_of, names_of
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, log_age, logarithm, remember
 from swarm_mj.protocol.window import LocalViews
@@ -25,9 +24,37 @@ FAR_RANGES = 4.0  # distances count up to here [ranges]
 CROWD = 10.0  # neighbours that count as 1
 TEAM = 40.0  # robots that count as 1
 
-# What a node tells, by its field in `NODE`, in the network's order.
-FEATURES: dict[str, str] = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-NODE = np.dtype([(field, np.float32) for field in FEATURES])
+
+class ExtendedNode:
+    """What a node tells of a teammate, in the network's order.
+
+    A node of the robot itself carries what concerns all of its neighbours.
+    """
+
+    is_oneself: Annotated[float, Feature("is oneself")]
+    is_known: Annotated[float, Feature("is known")]
+    timestamp_age: Annotated[float, Feature("age of T")]
+    distance: Annotated[float, Feature("distance")]  # of `FAR_RANGES`
+    is_near: Annotated[float, Feature("is in range")]
+    # Of oneself: since it last spoke first.
+    heard_age: Annotated[float, Feature("age of last packet heard")]
+    attempt_age: Annotated[float, Feature("age of last attempt")]
+    addressed_age: Annotated[float, Feature("age of last being addressed")]
+    # Of oneself, these two are to all in range together.
+    news: Annotated[float, Feature("news to it, by its last packet")]
+    unsaid_news: Annotated[float, Feature("news to it, if it heard what was said last")]
+    turn_rank: Annotated[float, Feature("rank of its turn", needs_turns=True)]
+    has_turn_1_5: Annotated[float, Feature("has a turn, 1.5 ranges apart", needs_turns=True)]
+    has_turn_2: Annotated[float, Feature("has a turn, 2 ranges apart", needs_turns=True)]
+    has_turn_3: Annotated[float, Feature("has a turn, 3 ranges apart", needs_turns=True)]
+    has_joined: Annotated[float, Feature("has a turn, by interference", needs_turns=True)]
+    neighbours: Annotated[float, Feature("neighbours")]
+    known_share: Annotated[float, Feature("share of the team known")]
+    team_size: Annotated[float, Feature("size of the team")]
+
+
+NODE = dtype_of(ExtendedNode)
+IS_LOCAL = tuple(not feature.needs_turns for feature in features_of(ExtendedNode).values())
 
 Places = Float[np.ndarray, "B N N 2"]
 Flags = Bool[np.ndarray, "B N N"]
@@ -37,9 +64,9 @@ Column = Float[np.ndarray, "N"]
 
 
 class ExtendedFeatures(FeatureExtractor):
-    """Features for learning in minutes; see `FEATURES`."""
+    """Features for learning in minutes: the fields of `ExtendedNode`."""
 
-    names: ClassVar[tuple[str, ...]] = tuple(FEATURES.values())
+    names: ClassVar[tuple[str, ...]] = names_of(ExtendedNode)
     uses: ClassVar[str] = (
         "its buffer, the packets it sent and received, the size of the team, and whose turn it is "
         "by the rule of spatial-tdma, in the order of identities and by the clock"
@@ -52,36 +79,55 @@ class ExtendedFeatures(FeatureExtractor):
     def graphs(self, views: LocalViews) -> Graphs:
         """Return what every robot's network sees now; must see every window."""
         remember(self._memory, views)
-        buffers, range_m, num_robots = views.buffers, self._mission.range_m, views.num_robots
+        buffers = views.buffers
+        range_m = self._mission.range_m
+        num_robots = views.num_robots
         node = np.empty(buffers.timestamp.shape, dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
         is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
         window = views.now.astype(np.int64)
-        seen = buffers.last_attempt, buffers.is_known, buffers.position_m, views.now
-        _write_ages_and_news(self._memory, *seen, range_m, node, may_address)
-        _write_beliefs(buffers.position_m, is_known, window, range_m, node)
-        threshold, has_joined = from_db(self._mission.sinr_threshold_db), node["has_joined"]
+        _write_ages_and_news(
+            memory=self._memory,
+            last_attempt=buffers.last_attempt,
+            is_observed=buffers.is_known,
+            believed_m=buffers.position_m,
+            now=views.now,
+            range_m=range_m,
+            node=node,
+            may_address=may_address,
+        )
+        _write_beliefs(
+            believed_m=buffers.position_m,
+            is_known=is_known,
+            window=window,
+            range_m=range_m,
+            node=node,
+        )
+        has_joined = node["has_joined"]
+        threshold = from_db(self._mission.sinr_threshold_db)
         write_joined(buffers.position_m, is_known, window, range_m, threshold, has_joined)
         rows = (len(window) * num_robots, num_robots)
         return Graphs(
-            node=node.view(np.float32).reshape(*rows, len(FEATURES)),
+            node=node.view(np.float32).reshape(*rows, len(ExtendedFeatures.names)),
             parent=buffers.parent.reshape(rows),
             may_address=may_address.reshape(rows),
-            has_turn=np.diagonal(node["has_joined"], axis1=1, axis2=2).reshape(-1) > 0.0,
+            has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,
         )
 
 
 class LocalFeatures(ExtendedFeatures):
     """The extended features without whose turn it is: nothing that a common order grants."""
 
-    names: ClassVar[tuple[str, ...]] = tuple(n for n in FEATURES.values() if "turn" not in n)
+    names: ClassVar[tuple[str, ...]] = tuple(
+        name for name, is_local in zip(ExtendedFeatures.names, IS_LOCAL, strict=True) if is_local
+    )
     uses: ClassVar[str] = "its buffer, and the packets it sent and received"
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return what every robot's network sees now; must see every window."""
         seen = super().graphs(views)
-        is_kept = np.array([name in self.names for name in FEATURES.values()])
-        return replace(seen, node=seen.node[:, :, is_kept], has_turn=np.zeros_like(seen.has_turn))
+        node = seen.node[:, :, np.array(IS_LOCAL)]
+        return replace(seen, node=node, has_turn=np.zeros_like(seen.has_turn))
 
 
 @compiled()
@@ -103,12 +149,13 @@ def _write_ages_and_news(
     for b in range(num_missions):
         rank = (np.arange(num_robots) - int(now[b])) % num_robots / num_robots
         for i in range(num_robots):
-            own, said = memory.timestamp[b, i], memory.said[b, i]
+            own = memory.timestamp[b, i]
+            said = memory.said[b, i]
             news = unsaid_news = 0.0
             num_known = np.sum(is_observed[b, i]) + (not is_observed[b, i, i])
             known_share = num_known / num_robots
             for k in range(num_robots):
-                of_k = node[b, i, k]
+                of_k: ExtendedNode = node[b, i, k]
                 of_k.timestamp_age = log_age(now[b], own[k], is_observed[b, i, k])
                 of_k.heard_age = log_age(now[b], memory.heard[b, i, k])
                 of_k.attempt_age = log_age(now[b], last_attempt[b, i, k])
@@ -116,27 +163,34 @@ def _write_ages_and_news(
                 ranges = math.sqrt(squared_distance(believed_m[b, i], k, i)) / range_m
                 is_known = k == i or is_observed[b, i, k]
                 may_address[b, i, k] = not is_known or ranges <= ADDRESS_RANGES
-                of_k.is_oneself, of_k.is_known = k == i, is_known
-                of_k.known_share, of_k.team_size = known_share, num_robots / TEAM
+                of_k.is_oneself = k == i
+                of_k.is_known = is_known
+                of_k.known_share = known_share
+                of_k.team_size = num_robots / TEAM
                 of_k.turn_rank = rank[k]
                 of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
                 of_k.is_near = is_known and k != i and ranges <= 1.0
-                of_k.news, of_k.unsaid_news = 0.0, 0.0
+                of_k.news = 0.0
+                of_k.unsaid_news = 0.0
                 if of_k.is_near > 0.0:
                     of_k.news, of_k.unsaid_news = _rises(own, memory.neighbour[b, i, k], said)
                     news += of_k.news
                     unsaid_news += of_k.unsaid_news
-                    of_k.news, of_k.unsaid_news = logarithm(of_k.news), logarithm(of_k.unsaid_news)
+                    of_k.news = logarithm(of_k.news)
+                    of_k.unsaid_news = logarithm(of_k.unsaid_news)
             # Of oneself at the end: a choice in the loop would double the time that it takes.
-            of_itself = node[b, i, i]
+            of_itself: ExtendedNode = node[b, i, i]
             of_itself.heard_age = log_age(now[b], memory.sent[b, i])
-            of_itself.news, of_itself.unsaid_news = logarithm(news), logarithm(unsaid_news)
+            of_itself.news = logarithm(news)
+            of_itself.unsaid_news = logarithm(unsaid_news)
 
 
 @compiled(fastmath=True)
 def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[float, float]:
     """Mean rise of a neighbour's T if it heard all: by its packet, or also by one's own."""
-    by_packet, by_both, zero = np.float32(0.0), np.float32(0.0), np.float32(0.0)
+    zero = np.float32(0.0)
+    by_packet = zero
+    by_both = zero
     for j in range(own.shape[0]):
         by_packet += max(own[j] - neighbour[j], zero)
         by_both += max(own[j] - max(neighbour[j], said[j]), zero)
@@ -154,28 +208,39 @@ def _write_beliefs(
     """Write neighbours and turns by distance, which follow from positions and the clock alone."""
     num_missions, num_robots = is_known.shape[:2]
     # Columns of their own, with which the inner loops are compiled to vectors.
-    x_m, y_m, is_close = np.empty(num_robots), np.empty(num_robots), np.empty(num_robots)
-    known_x_m, known_y_m = np.empty(num_robots), np.empty(num_robots)
+    x_m = np.empty(num_robots)
+    y_m = np.empty(num_robots)
+    known_x_m = np.empty(num_robots)
+    known_y_m = np.empty(num_robots)
+    is_close = np.empty(num_robots)
     for b in range(num_missions):
         for i in range(num_robots):
-            its, last = node[b, i], node[b, i - 1]
+            its = node[b, i]
             if believes_as_the_last(believed_m[b], is_known[b], i):
+                last = node[b, i - 1]
                 for k in range(num_robots):
-                    of_k, same = its[k], last[k]
-                    of_k.neighbours, of_k.has_turn_1_5 = same.neighbours, same.has_turn_1_5
-                    of_k.has_turn_2, of_k.has_turn_3 = same.has_turn_2, same.has_turn_3
+                    of_k: ExtendedNode = its[k]
+                    same: ExtendedNode = last[k]
+                    of_k.neighbours = same.neighbours
+                    of_k.has_turn_1_5 = same.has_turn_1_5
+                    of_k.has_turn_2 = same.has_turn_2
+                    of_k.has_turn_3 = same.has_turn_3
                 continue
             num_known = 0
             for k in range(num_robots):
-                x_m[k], y_m[k] = believed_m[b, i, k, 0], believed_m[b, i, k, 1]
-                known_x_m[num_known], known_y_m[num_known] = x_m[k], y_m[k]
+                x_m[k] = believed_m[b, i, k, 0]
+                y_m[k] = believed_m[b, i, k, 1]
+                known_x_m[num_known] = x_m[k]
+                known_y_m[num_known] = y_m[k]
                 num_known += is_known[b, i, k]  # else the next one takes its place
             for k in range(num_robots):
                 count = 0
                 for n in range(num_known if is_known[b, i, k] else 0):
-                    dx, dy = known_x_m[n] - x_m[k], known_y_m[n] - y_m[k]
+                    dx = known_x_m[n] - x_m[k]
+                    dy = known_y_m[n] - y_m[k]
                     count += 1 if dx * dx + dy * dy <= range_m * range_m else 0
-                its[k].neighbours = max(count - 1, 0) / CROWD  # for it finds itself
+                of_each: ExtendedNode = its[k]
+                of_each.neighbours = max(count - 1, 0) / CROWD  # for it finds itself
             whom = is_known[b, i]
             write_turns(x_m, y_m, whom, window[b], 1.5 * range_m, its["has_turn_1_5"], is_close)
             write_turns(x_m, y_m, whom, window[b], 2.0 * range_m, its["has_turn_2"], is_close)
@@ -212,5 +277,6 @@ def write_turns(
         if is_close[k] == 0.0 and has_turn[k] == 0.0:
             has_turn[k] = 1.0
             for j in range(num_robots):
-                dx, dy = x_m[j] - x_m[k], y_m[j] - y_m[k]
+                dx = x_m[j] - x_m[k]
+                dy = y_m[j] - y_m[k]
                 is_close[j] = 1.0 if dx * dx + dy * dy < radius_m * radius_m else is_close[j]

@@ -1,10 +1,12 @@
-"""The one table of feature sets, and those that a user brings."""
+"""The one table of feature sets, those that a user brings, and what stored networks saw."""
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
+from itertools import zip_longest
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.buffer_features import BufferFeatures
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
+from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
 from swarm_mj.system.fields import did_you_mean
 from swarm_mj.system.user_code import FORM, load
@@ -33,6 +35,38 @@ def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
 def num_features(features: str) -> int:
     """Return the count of a node's numbers in a feature set; raises as `make_extractor`."""
     return len(_feature_set(features).names)
+
+
+def known_names(features: str) -> tuple[str, ...]:
+    """Return the names of a set's features, in order; none of a user's own that is not loaded."""
+    known = FEATURE_SETS | _own
+    return known[features].names if features in known else ()
+
+
+def check_unchanged(features: str, trained_on: Sequence[str], what: str) -> None:
+    """Raise ValueError unless a set's features are those that a network was trained on, in order.
+
+    A user's own set is not compared until it is loaded.
+
+    Args:
+        features: The set's name.
+        trained_on: The names that the network's file holds. None: it is of version 1.0.0, which
+            did not name them; so they are those of the set as it was then.
+        what: The network, for the message.
+    """
+    then = trained_on or FEATURES_OF_1_0.get(features, ())
+    now = known_names(features)
+    if not then or not now:
+        return
+    for number, (its, ours) in enumerate(zip_longest(then, now), start=1):
+        if its != ours:
+            was = f'"{its}"' if its else "nothing"
+            has = f'"{ours}"' if ours else "nothing"
+            raise ValueError(
+                f"{what} was trained on other {features} features: number {number} of them was "
+                f"{was} and is {has} now; fly it with the version that made it, or train another "
+                "with `swarm-mj train`"
+            )
 
 
 def _feature_set(features: str) -> type[FeatureExtractor]:

@@ -6,20 +6,17 @@ of mission `b`.
 
 from abc import ABC, abstractmethod
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple
+from typing import Annotated, ClassVar, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Shaped
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+from swarm_mj.policies.gnn.features import Feature, dtype_of, names_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
 REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever the mission [windows]
-# The numbers of a node, in the order of the extractors' names.
-STATE = ("timestamp", "x", "y", "velocity_x", "velocity_y", "last_attempt")
-PAPER_NODE = np.dtype([(field, np.float32) for field in ("is_oneself", "is_known", *STATE)])
-REFERENCE_NODE = np.dtype([(field, np.float32) for field in (STATE[0], "zero", *STATE[1:])])
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -57,6 +54,22 @@ def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> N
         raise ValueError(f"{features} names {named} features, but its node has {found}")
 
 
+class PaperNode:
+    """What a node tells of a teammate, in the network's order."""
+
+    is_oneself: Annotated[float, Feature("is oneself")]
+    is_known: Annotated[float, Feature("is known")]
+    timestamp: Annotated[float, Feature("T")]
+    x: Annotated[float, Feature("p_x")]
+    y: Annotated[float, Feature("p_y")]
+    velocity_x: Annotated[float, Feature("v_x")]
+    velocity_y: Annotated[float, Feature("v_y")]
+    last_attempt: Annotated[float, Feature("L")]
+
+
+PAPER_NODE = dtype_of(PaperNode)
+
+
 class PaperFeatures(FeatureExtractor):
     """The paper's features: T, M and L, by the mission's area and duration.
 
@@ -64,22 +77,37 @@ class PaperFeatures(FeatureExtractor):
     at the start, and another the robot itself.
     """
 
-    names: ClassVar[tuple[str, ...]] = (
-        "is oneself", "is known", "T", "p_x", "p_y", "v_x", "v_y", "L",
-    )  # fmt: skip
+    names: ClassVar[tuple[str, ...]] = names_of(PaperNode)
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return the buffers; positions from the area's middle, velocities per mission."""
-        mission, buffers = self._mission, views.buffers
+        mission = self._mission
+        buffers = views.buffers
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         node = np.empty(buffers.timestamp.shape, dtype=PAPER_NODE)
-        node["is_oneself"], node["is_known"] = is_oneself, buffers.is_known | is_oneself
+        node["is_oneself"] = is_oneself
+        node["is_known"] = buffers.is_known | is_oneself
         scale = Scale(
             per_window=1.0 / mission.num_windows,
             per_m=1.0 / mission.side_m,
             per_mps=mission.num_windows * mission.window_s / mission.side_m,
         )
         return _with_state(node, views, is_relative=False, scale=scale)
+
+
+class ReferenceNode:
+    """What a node tells of a teammate, in the order of the authors' code."""
+
+    timestamp: Annotated[float, Feature("T - t")]
+    zero: Annotated[float, Feature("zero")]
+    x: Annotated[float, Feature("p_x relative")]
+    y: Annotated[float, Feature("p_y relative")]
+    velocity_x: Annotated[float, Feature("v_x relative")]
+    velocity_y: Annotated[float, Feature("v_y relative")]
+    last_attempt: Annotated[float, Feature("L - t")]
+
+
+REFERENCE_NODE = dtype_of(ReferenceNode)
 
 
 class ReferenceFeatures(FeatureExtractor):
@@ -89,9 +117,7 @@ class ReferenceFeatures(FeatureExtractor):
     never heard of, which count as if at rest in the middle of the area at the start.
     """
 
-    names: ClassVar[tuple[str, ...]] = (
-        "T - t", "zero", "p_x relative", "p_y relative", "v_x relative", "v_y relative", "L - t",
-    )  # fmt: skip
+    names: ClassVar[tuple[str, ...]] = names_of(ReferenceNode)
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return the buffers as the authors' code shows them to its network."""
@@ -115,10 +141,18 @@ def _with_state(
 ) -> Graphs:
     """Write what the buffers hold into nodes; in their graphs everyone may be addressed."""
     buffers = views.buffers
-    known = buffers.timestamp, buffers.last_attempt, buffers.position_m, buffers.velocity_mps
-    _write_state(*known, views.now, is_relative, scale, node)
+    _write_state(
+        timestamp=buffers.timestamp,
+        last_attempt=buffers.last_attempt,
+        position_m=buffers.position_m,
+        velocity_mps=buffers.velocity_mps,
+        now=views.now,
+        is_relative=is_relative,
+        scale=scale,
+        node=node,
+    )
     num_missions, num_robots = buffers.shape
-    rows = num_missions * num_robots, num_robots
+    rows = (num_missions * num_robots, num_robots)
     return Graphs(
         node=node.view(np.float32).reshape(*rows, -1),
         parent=buffers.parent.reshape(rows),
@@ -149,7 +183,7 @@ def _write_state(
                 x_m, y_m = position_m[b, i, i]
                 x_mps, y_mps = velocity_mps[b, i, i]
             for k in range(num_robots):
-                of_k = node[b, i, k]
+                of_k: PaperNode | ReferenceNode = node[b, i, k]
                 of_k.timestamp = (timestamp[b, i, k] - t) * scale.per_window
                 of_k.x = (position_m[b, i, k, 0] - x_m) * scale.per_m
                 of_k.y = (position_m[b, i, k, 1] - y_m) * scale.per_m

@@ -1,16 +1,30 @@
-"""A GNN as a policy: every robot's own network on its own buffer's graph (III-A to III-C)."""
+"""A GNN as a policy: every robot's own network on its own buffer's graph (III-A to III-C).
 
-from typing import Any
+Without torch, which takes seconds to import, until it flies.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-import torch
-from jaxtyping import Bool, Float, Int
-from torch import Tensor
+from jaxtyping import Float
 
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
-from swarm_mj.policies.gnn.network import AggregationGnn
-from swarm_mj.policies.learned import IMPOSSIBLE, LearnedPolicy
+from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.policy import Parameters
+from swarm_mj.policies.policy_config import GnnShape, Weights
+
+if TYPE_CHECKING:
+    from swarm_mj.policies.gnn.network import AggregationGnn
+
+
+@dataclass(frozen=True, kw_only=True)
+class StoredGnn:
+    """A network as its file holds it: what one of torch's can be made of."""
+
+    shape: GnnShape
+    weights: Weights
 
 
 class GnnPolicy(LearnedPolicy):
@@ -21,17 +35,26 @@ class GnnPolicy(LearnedPolicy):
 
     def __init__(
         self,
-        network: AggregationGnn,
+        network: "AggregationGnn | StoredGnn",
         extractor: FeatureExtractor,
         silence_logit: float = 0.0,
-        **options: Any,
+        *,
+        is_deterministic: bool = False,
+        own_features: str = "",
     ) -> None:
-        """Take the network as it is, live, on any device: later changes of its weights count.
+        """Take a network and what makes the features that it was trained on.
 
-        The logit is added to silence, but in a robot's own turn.
+        Args:
+            network: Torch's own as it is, live, on any device: later changes of its weights count.
+                One that was stored becomes torch's when it flies first.
+            extractor: It makes the features, of the mission that is flown.
+            silence_logit: Added to silence, but in a robot's own turn.
+            is_deterministic: Whether robots take the most probable recipient instead of a draw.
+            own_features: The name of the features, as `module:Name`, if they are a user's own.
         """
-        super().__init__(extractor, **options)
-        self._network, self._silence_logit = network, silence_logit
+        super().__init__(extractor, is_deterministic=is_deterministic, own_features=own_features)
+        self._network = network
+        self._silence_logit = silence_logit
         self.uses = f"{extractor.uses}, by a trained graph neural network"
 
     @property
@@ -39,57 +62,28 @@ class GnnPolicy(LearnedPolicy):
         """The receptive field as well."""
         return {"receptive_field": self._network.shape.receptive_field, **super().parameters}
 
+    def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
+        """Make torch's network before the first window; arguments as in `Policy.start`."""
+        super().start(num_robots, rngs)
+        self._live_network()
+
     def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
         """Return each robot's logits over recipients, from its own graph."""
-        num_rows, num_robots = graphs.may_address.shape
-        node = torch.from_numpy(graphs.node)
-        parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
-        may_address = torch.from_numpy(graphs.may_address)
-        device, num_threads = next(self._network.parameters()).device, torch.get_num_threads()
-        torch.set_num_threads(1)  # small batches are slower on several
-        try:
-            with torch.inference_mode():
-                output = self._network(node.to(device), parent.to(device), may_address.to(device))
-                return recipient_logits(
-                    output.cpu(),
-                    owner=torch.arange(num_rows) % num_robots,
-                    may_address=may_address,
-                    silence_logit=self._silence_logit,
-                    has_turn=torch.from_numpy(graphs.has_turn),
-                ).numpy()
-        finally:
-            torch.set_num_threads(num_threads)  # the setting is the process's
+        from swarm_mj.policies.gnn.decisions import network_logits
 
-    def identity(self) -> tuple[object, dict[str, np.ndarray]]:
+        return network_logits(self._live_network(), graphs, self._silence_logit)
+
+    def identity(self) -> tuple[object, Weights]:
         """Return what the network is made of and sees, and its weights now."""
+        made_of = (self._network.shape, self._extractor.names, self._silence_logit)
+        if isinstance(self._network, StoredGnn):
+            return made_of, self._network.weights
         state = self._network.state_dict().items()
-        weights = {name: tensor.cpu().contiguous().numpy() for name, tensor in state}
-        return (self._network.shape, self._extractor.names, self._silence_logit), weights
+        return made_of, {name: tensor.cpu().contiguous().numpy() for name, tensor in state}
 
+    def _live_network(self) -> "AggregationGnn":
+        if isinstance(self._network, StoredGnn):
+            from swarm_mj.policies.gnn.fast import network_of
 
-def recipient_logits(
-    output: Float[Tensor, "R N O"],
-    owner: Int[Tensor, "R"],
-    may_address: Bool[Tensor, "R N"],
-    silence_logit: float = 0.0,
-    has_turn: Bool[Tensor, "R"] | None = None,
-) -> Float[Tensor, "R N"]:
-    """Return each robot's logits over recipients; oneself is silence (III-C).
-
-    With one number per node it is the node's logit. With two, as in the authors' code, they are the
-    logits of addressing it at full and at zero power; all that send nothing count together. Each
-    row is of one robot, its `owner`, whose silence gains `silence_logit` unless it has a turn.
-    Recipients that it may not address have `IMPOSSIBLE`; the owner always may.
-    """
-    own = owner[:, None]
-    logits = output[:, :, 0]
-    if output.shape[2] > 1:  # the authors' second number: of sending at no power, hence of silence
-        zero_power = output[:, :, 1].masked_fill(~may_address, IMPOSSIBLE)
-        unsent = torch.cat([zero_power, logits.gather(1, own)], dim=1)
-        logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
-    if silence_logit:
-        bias = torch.full_like(own, silence_logit, dtype=logits.dtype)
-        if has_turn is not None:
-            bias = bias.masked_fill(has_turn[:, None], 0.0)
-        logits = logits.scatter_add(1, own, bias)
-    return logits.masked_fill(~may_address, IMPOSSIBLE)
+            self._network = network_of(self._network.shape, self._network.weights)
+        return self._network

@@ -9,6 +9,7 @@ from mixed_missions import flown
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.buffer_features import BufferFeatures
+from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.protocol.buffers import NEVER, empty_buffers
 from swarm_mj.protocol.window import LocalViews
 
@@ -31,11 +32,15 @@ def buffers_of_robot_1():
 
 
 def seen(buffers, mission=None):
-    """The features of each teammate by name, and whom robot 1 may address."""
+    """The features of each teammate by the name of their place, and whom robot 1 may address.
+
+    The names are those that stored policies know, and none of the code under test: two features
+    that change places are both wrong.
+    """
     extractor = BufferFeatures(mission or paper("stationary", num_robots=4))
     graphs = extractor.graphs(LocalViews(buffers=buffers, now=np.array([NOW]), phases=()))
     values = graphs.node[OBSERVER].T
-    return dict(zip(extractor.names, values, strict=True)), graphs
+    return dict(zip(FEATURES_OF_1_0["buffer"], values, strict=True)), graphs
 
 
 def log_age(windows):

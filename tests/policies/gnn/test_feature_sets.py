@@ -1,11 +1,24 @@
-"""The table of feature sets: their names and their sizes."""
+"""The table of feature sets: their names and sizes, and what stored policies know of them."""
+
+import hashlib
+import inspect
+import json
+from pathlib import Path
 
 import pytest
 
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.gnn.buffer_features import BufferFeatures
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
-from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, make_extractor, num_features
+from swarm_mj.policies.gnn.feature_sets import (
+    FEATURE_SETS,
+    check_unchanged,
+    known_names,
+    make_extractor,
+    num_features,
+)
+from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
 
 
@@ -29,3 +42,62 @@ def test_unknown_features_are_a_clear_error(refuse):
     assert set(FEATURE_SETS) == {"paper", "reference", "buffer", "local", "extended"}
     with pytest.raises(ValueError, match="extended, or module:Name of your own, not 'all'"):
         refuse("all")
+
+
+@pytest.mark.parametrize("features", FEATURES_OF_1_0)
+def test_the_sets_are_what_policies_of_1_0_were_trained_on(features):
+    """Who changes a set makes all policies trained on it useless, `gnn` too: make one of your own.
+
+    Two features that change places are named, with the file they stand in.
+    """
+    file = Path(inspect.getfile(FEATURE_SETS[features])).name
+    now, then = FEATURE_SETS[features].names, FEATURES_OF_1_0[features]
+    changed = [(k, was, has) for k, (was, has) in enumerate(zip(then, now)) if was != has]  # noqa: B905
+    assert changed == [], f"{file}: features of {features} at other places (place, was, is)"
+    assert len(now) == len(then), f"{file}: {features} has another number of features"
+
+
+def test_the_record_of_1_0_is_as_it_was():
+    """It must never change, not even together with the code."""
+    assert list(FEATURES_OF_1_0) == ["paper", "reference", "buffer", "local", "extended"]
+    digest = hashlib.sha256(json.dumps(dict(FEATURES_OF_1_0)).encode()).hexdigest()
+    assert digest[:16] == "fd34286eaf2ba0b6"
+
+
+NAMES = FEATURES_OF_1_0["extended"]
+SWAPPED = (*NAMES[:2], NAMES[3], NAMES[2], *NAMES[4:])
+
+
+@pytest.mark.parametrize(
+    ("now", "said"),
+    [
+        (SWAPPED, 'number 3 of them was "age of T" and is "distance" now'),
+        (NAMES[:-1], 'number 18 of them was "size of the team" and is nothing now'),
+        ((*NAMES, "battery"), 'number 19 of them was nothing and is "battery" now'),
+        ((*NAMES[:-1], "battery"), 'number 18 of them was "size of the team" and is "battery" now'),
+    ],
+)
+@pytest.mark.parametrize("trained_on", [NAMES, ()], ids=["named", "of 1.0.0"])
+def test_features_that_changed_are_refused_by_the_first_that_differs(
+    monkeypatch, now, said, trained_on
+):
+    check_unchanged("extended", trained_on, "policy mine")
+    monkeypatch.setattr(ExtendedFeatures, "names", now)
+    with pytest.raises(
+        ValueError, match=r"^policy mine was trained on other extended features: "
+    ) as refused:
+        check_unchanged("extended", trained_on, "policy mine")
+    assert said in str(refused.value)
+    assert str(refused.value).endswith("or train another with `swarm-mj train`")
+
+
+def test_a_users_own_set_has_names_once_it_is_loaded(monkeypatch):
+    own = "swarm_mj.policies.gnn.graphs:PaperFeatures"
+    monkeypatch.setattr(feature_sets, "_own", {})
+    assert known_names(own) == ()
+    check_unchanged(own, ("age",), "policy mine")
+    feature_sets.load_features(own)
+    assert known_names(own) == PaperFeatures.names
+    check_unchanged(own, (), "policy mine")  # of 1.0.0: only their number was known
+    with pytest.raises(ValueError, match='number 1 of them was "age" and is "is oneself" now'):
+        check_unchanged(own, ("age",), "policy mine")

@@ -10,8 +10,9 @@ from mixed_missions import NUM_ROBOTS, SEEDS, mixed_views
 from tiny_policies import FEATURES, save_tiny, tiny_network
 
 from swarm_mj.mission import paper, reference
+from swarm_mj.policies.gnn.decisions import recipient_logits
 from swarm_mj.policies.gnn.feature_sets import make_extractor
-from swarm_mj.policies.gnn.policy import GnnPolicy, recipient_logits
+from swarm_mj.policies.gnn.policy import GnnPolicy
 from swarm_mj.policies.learned import IMPOSSIBLE, sample
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.rollout import rollout, summarise

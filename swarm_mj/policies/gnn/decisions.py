@@ -1,0 +1,63 @@
+"""From the network's numbers to logits over recipients (III-C)."""
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from torch import Tensor
+
+from swarm_mj.policies.gnn.graphs import Graphs
+from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.learned import IMPOSSIBLE
+
+
+def network_logits(
+    network: AggregationGnn, graphs: Graphs, silence_logit: float
+) -> Float[np.ndarray, "R N"]:
+    """Return each robot's logits over recipients, row by row, from its own graph."""
+    num_rows, num_robots = graphs.may_address.shape
+    node = torch.from_numpy(graphs.node)
+    parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
+    may_address = torch.from_numpy(graphs.may_address)
+    device = next(network.parameters()).device
+    num_threads = torch.get_num_threads()
+    torch.set_num_threads(1)  # small batches are slower on several
+    try:
+        with torch.inference_mode():
+            output = network(node.to(device), parent.to(device), may_address.to(device))
+            return recipient_logits(
+                output.cpu(),
+                owner=torch.arange(num_rows) % num_robots,
+                may_address=may_address,
+                silence_logit=silence_logit,
+                has_turn=torch.from_numpy(graphs.has_turn),
+            ).numpy()
+    finally:
+        torch.set_num_threads(num_threads)  # the setting is the process's
+
+
+def recipient_logits(
+    output: Float[Tensor, "R N O"],
+    owner: Int[Tensor, "R"],
+    may_address: Bool[Tensor, "R N"],
+    silence_logit: float = 0.0,
+    has_turn: Bool[Tensor, "R"] | None = None,
+) -> Float[Tensor, "R N"]:
+    """Return each robot's logits over recipients; oneself is silence (III-C).
+
+    With one number per node it is the node's logit. With two, as in the authors' code, they are the
+    logits of addressing it at full and at zero power; all that send nothing count together. Each
+    row is of one robot, its `owner`, whose silence gains `silence_logit` unless it has a turn.
+    Recipients that it may not address have `IMPOSSIBLE`; the owner always may.
+    """
+    own = owner[:, None]
+    logits = output[:, :, 0]
+    if output.shape[2] > 1:  # the authors' second number: of sending at no power, hence of silence
+        zero_power = output[:, :, 1].masked_fill(~may_address, IMPOSSIBLE)
+        unsent = torch.cat([zero_power, logits.gather(1, own)], dim=1)
+        logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
+    if silence_logit:
+        bias = torch.full_like(own, silence_logit, dtype=logits.dtype)
+        if has_turn is not None:
+            bias = bias.masked_fill(has_turn[:, None], 0.0)
+        logits = logits.scatter_add(1, own, bias)
+    return logits.masked_fill(~may_address, IMPOSSIBLE)
