@@ -11,6 +11,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.replay import links as compared
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import Lines, LinkMismatch, LinkRows, PacketPaths, Positions
+from swarm_mj.replay.palette import Fate
 from swarm_mj.simulation.components import components_in
 
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
@@ -40,9 +41,12 @@ def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) 
     if not moves and not is_tight:
         return Ground(centre_m=np.zeros((len(position_m), 2)), reach_m=max(half_side_m, farthest_m))
     axis = 1 if moves else (0, 1)
-    low_m, high_m = (end(position_m, axis=axis, keepdims=True) for end in (np.min, np.max))
-    # Of constant size all the same: a changing scale would look like motion.
-    reach_m = max(0.0 if moves else 1.0, float(np.max(high_m - low_m)) / 2.0)
+    low_m = np.min(position_m, axis=axis, keepdims=True)
+    high_m = np.max(position_m, axis=axis, keepdims=True)
+    # Of constant size all the same: a changing scale would look like motion. And of some size,
+    # also where a lone robot stands still.
+    least_m = 0.0 if moves else 1.0
+    reach_m = max(least_m, float(np.max(high_m - low_m)) / 2.0)
     centre_m = np.broadcast_to((low_m + high_m)[:, 0] / 2.0, (len(position_m), 2))
     return Ground(centre_m=centre_m, reach_m=reach_m)
 
@@ -84,7 +88,7 @@ class Footage:
     known_age: Float[np.ndarray, "T N"]  # of what the ego robot knows [windows]; nan: nothing
     is_cut_off: Bool[np.ndarray, "T N"]  # no packets reach the ego robot, over any number of hops
     age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
-    packets: dict[str, PacketPaths]  # by their fate, in the order of drawing
+    packets: dict[Fate, PacketPaths]  # by their fate, in the order of drawing
     mismatch: LinkMismatch  # has no snapshots in free space
     ground: Ground  # that pictures show
     scene: Scene | None = None  # what changed the arena; files have its name only
@@ -114,12 +118,16 @@ class Footage:
         """The robots' colours."""
         return palette.robot_colours(self.known_age, self.facts.full_scale, self.is_on, self.ego)
 
-    def packets_at(self, row: int) -> dict[str, PacketPaths]:
+    def packets_at(self, row: int) -> dict[Fate, PacketPaths]:
         """Return one window's packets by their fate; what matters more is drawn over the rest."""
-        found = {}
+        found: dict[Fate, PacketPaths] = {}
         for fate, packets in self.packets.items():
-            its = slice(*np.searchsorted(packets.row, [row, row + 1]))
-            found[fate] = PacketPaths(packets.row[its], packets.start_m[its], packets.end_m[its])
+            first, after = np.searchsorted(packets.row, [row, row + 1])
+            found[fate] = PacketPaths(
+                row=packets.row[first:after],
+                start_m=packets.start_m[first:after],
+                end_m=packets.end_m[first:after],
+            )
         return found
 
     def is_own(self, links: LinkRows) -> Bool[np.ndarray, "L"]:
@@ -133,9 +141,11 @@ class Footage:
 
     def mismatch_lines(self, row: int) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
         """Return the lines of one window's links [m], and their colours."""
-        lines_m, colours = [], []
+        lines_m = []
+        colours = []
         for kind, links in compared.by_kind(self.links(row)).items():
-            ends_m, pieces = compared.ends(links, self.position_m, row), compared.PIECES[kind]
+            ends_m = compared.ends(links, self.position_m, row)
+            pieces = compared.PIECES[kind]
             lines_m.append(compared.divided(ends_m, pieces))
             colours.append(np.repeat(compared.shades(kind, links), len(pieces), axis=0))
         return np.concatenate(lines_m), np.concatenate(colours)

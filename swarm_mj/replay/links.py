@@ -12,6 +12,7 @@ from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
 from swarm_mj.radio.composed import strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.replay import palette
+from swarm_mj.replay.palette import Fate, LinkKind
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.decibels import to_db
 
@@ -30,7 +31,7 @@ WAY_SHARE = 0.005  # of the area's side, that robots may fly between snapshots
 WHOLE = np.array([[0.0, 1.0]])
 NUM_DASHES, DASH = 4, 0.6
 DASHES = (np.arange(NUM_DASHES)[:, None] + [0.0, DASH]) / (NUM_DASHES - 1 + DASH)
-PIECES = {"unbelieved": WHOLE, "too_weak": DASHES}
+PIECES: dict[LinkKind, Float[np.ndarray, "_ 2"]] = {"unbelieved": WHOLE, "too_weak": DASHES}
 FAINTEST, FAINTEST_DB = 0.5, -30.0  # the shade of a link that misses this margin or more
 BRIGHTEST = 0.85  # of one that is hardly too weak
 
@@ -38,7 +39,16 @@ BRIGHTEST = 0.85  # of one that is hardly too weak
 # it; once for both directions. `loss_db` is between the antennas, `margin_db` of the mean power
 # over what decodes. Files keep these four numbers.
 NUMBERS = ("sender", "receiver", "loss_db", "margin_db")
-LINK = np.dtype([("row", int), *((name, np.int16) for name in NUMBERS), ("is_too_weak", bool)])
+LINK = np.dtype(
+    [
+        ("row", int),  # of the snapshot
+        ("sender", np.int16),
+        ("receiver", np.int16),
+        ("loss_db", np.int16),
+        ("margin_db", np.int16),
+        ("is_too_weak", bool),
+    ]
+)
 LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
 Lines: TypeAlias = Float[np.ndarray, "_ 2 2"]  # from start to end [m]
 
@@ -53,7 +63,7 @@ class PacketPaths(NamedTuple):
 
 def fates(
     recipient: Phases, heard: Phases, position_m: Positions, *, is_broadcast: bool
-) -> dict[str, PacketPaths]:
+) -> dict[Fate, PacketPaths]:
     """Sort the packets of T windows by their fate, in the order of drawing.
 
     Addressed packets are delivered, lost, overheard, answered or unanswered. `lost` and
@@ -67,7 +77,7 @@ def fates(
     speaker = heard[row, phase, hearer]
     received = np.stack([row, speaker, hearer])
     if is_broadcast:
-        found = {"heard": received}
+        found: dict[Fate, np.ndarray] = {"heard": received}
     else:
         is_overheard = recipient[row, phase, speaker] != hearer
         row, phase, sender = np.nonzero(is_other(recipient))
@@ -82,10 +92,12 @@ def fates(
             "delivered": sent[:, is_request & is_decoded],
             "answered": sent[:, ~is_request & is_decoded],
         }
-    return {
-        fate: PacketPaths(row, position_m[row, sender], position_m[row, receiver])
-        for fate, (row, sender, receiver) in found.items()
-    }
+    paths: dict[Fate, PacketPaths] = {}
+    for fate, (row, sender, receiver) in found.items():
+        start_m = position_m[row, sender]
+        end_m = position_m[row, receiver]
+        paths[fate] = PacketPaths(row=row, start_m=start_m, end_m=end_m)
+    return paths
 
 
 def is_other(robot: Phases) -> Bool[np.ndarray, "T 2 N"]:
@@ -124,7 +136,7 @@ class LinkMismatch(NamedTuple):
         return self.links[self.links["row"] == row]
 
 
-NO_MISMATCH = LinkMismatch(np.zeros(0, dtype=int), np.zeros(0, LINK))
+NO_MISMATCH = LinkMismatch(window=np.zeros(0, dtype=int), links=np.zeros(0, LINK))
 
 
 class RadioSnapshot(NamedTuple):
@@ -148,14 +160,16 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     channel = swarm.truth.channel
     if channel is None:
         return None
-    mission, position_m = swarm.mission, swarm.states.position_m[index]
+    mission = swarm.mission
+    position_m = swarm.states.position_m[index]
     true_mw = channel.mean_powers_mw(position_m, index)
     believed_mw = swarm.belief.links(position_m).received_mw
     min_mw = channel.reception.noise_mw * channel.reception.threshold
     is_on = swarm.states.is_active
     here = np.ones(mission.num_robots, dtype=bool) if is_on is None else is_on[index]
     pairs = here[:, None] & here & ~np.eye(mission.num_robots, dtype=bool)
-    is_true, is_believed = (pairs & (power >= min_mw) for power in (true_mw, believed_mw))
+    is_true = pairs & (true_mw >= min_mw)
+    is_believed = pairs & (believed_mw >= min_mw)
     differs = is_true != is_believed
     differs &= ~np.tril(differs.T)  # the other direction stands for both
     links = np.zeros(int(np.sum(differs)), LINK)
@@ -166,19 +180,31 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     links["loss_db"] = np.round(to_db(sent_mw / power_mw))
     # Rounded down: a packet that does not decode must not show a margin of 0 dB.
     links["margin_db"] = np.floor(to_db(power_mw / min_mw))
-    num_believed, num_working = (int(np.sum(np.triu(x | x.T))) for x in (is_believed, is_true))
-    group = strong_groups(is_true).astype(np.int16)
-    return RadioSnapshot(group, links, num_believed, num_working)
+    return RadioSnapshot(
+        group=strong_groups(is_true).astype(np.int16),
+        links=links,
+        num_believed=_num_links(is_believed),
+        num_working=_num_links(is_true),
+    )
 
 
-def by_kind(links: LinkRows) -> dict[str, LinkRows]:
+def _num_links(is_link: Bool[np.ndarray, "N N"]) -> int:
+    """Count links, one for both directions."""
+    return int(np.sum(np.triu(is_link | is_link.T)))
+
+
+def by_kind(links: LinkRows) -> dict[LinkKind, LinkRows]:
     """Sort links: those that decode without belief, and believed ones that are too weak."""
-    return {kind: links[links["is_too_weak"] == (kind == "too_weak")] for kind in palette.MISMATCH}
+    is_too_weak = links["is_too_weak"]
+    # In the order of `palette.MISMATCH`: what is drawn first may be covered by what follows.
+    return {"unbelieved": links[~is_too_weak], "too_weak": links[is_too_weak]}
 
 
 def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Lines:
     """Return where links begin and end, by the robots' positions in a window or each one's [m]."""
-    return np.stack([position_m[row, links[end]] for end in ("sender", "receiver")], axis=1)
+    start_m = position_m[row, links["sender"]]
+    end_m = position_m[row, links["receiver"]]
+    return np.stack([start_m, end_m], axis=1)
 
 
 def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
@@ -188,7 +214,7 @@ def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
     return (start_m + pieces[None, :, :, None] * way_m).reshape(-1, 2, 2)
 
 
-def shades(kind: str, links: LinkRows) -> UInt8[np.ndarray, "L 3"]:
+def shades(kind: LinkKind, links: LinkRows) -> UInt8[np.ndarray, "L 3"]:
     """Return the colours of links of one kind: the lower the margin, the darker."""
     if kind != "too_weak":
         return np.tile(np.array(palette.MISMATCH[kind], dtype=np.uint8), (len(links), 1))

@@ -6,7 +6,6 @@ so that rerun finds it where it looks.
 """
 
 import hashlib
-import itertools
 import shlex
 from pathlib import Path
 
@@ -15,9 +14,19 @@ import pyarrow as pa
 from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
-from swarm_mj.replay import palette
+from swarm_mj.replay import layers, palette
 from swarm_mj.replay.footage import Facts, Footage, shown_ground
-from swarm_mj.replay.links import LINK, NO_MISMATCH, NUMBERS, SEGMENTS, LinkMismatch, PacketPaths
+from swarm_mj.replay.layers import Entity, Lines3D
+from swarm_mj.replay.links import (
+    LINK,
+    NO_MISMATCH,
+    NUMBERS,
+    SEGMENTS,
+    LinkMismatch,
+    LinkRows,
+    PacketPaths,
+)
+from swarm_mj.replay.palette import Fate, LinkKind
 from swarm_mj.replay.rerun_log import TIMELINE
 from swarm_mj.system.reading import open_file, read_json
 
@@ -29,7 +38,8 @@ END = (0).to_bytes(8, "little")  # the kind of a stream's last message
 FIELD = b"\xfa\x7f\x20"  # protobuf's tag of field 2047, and the length of a SHA-256
 SEAL_BYTES = HEADER_BYTES + len(END) + 8 + len(FIELD) + 32 + FOOTER_BYTES
 
-Columns = dict[str, pa.Array]  # timed components, named "/entity component", one row per window
+# Components that change, by their entity's path and their name; one row per window.
+Columns = dict[tuple[str, str], pa.Array]
 
 
 def with_digest(recorded: bytes) -> bytes:
@@ -57,85 +67,106 @@ def check_replay(path: Path) -> None:
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
     """Return the numbers of a whole replay's windows, in order; 1 is a mission's first."""
-    return _windows(_columns(path), "/scene/robots")
+    return _windows(_columns(path), layers.SCENE_ROBOTS)
 
 
 def read_footage(path: Path) -> Footage:
     """Return what a video shows; raise as `check_replay`, for replays of earlier versions, too."""
     check_replay(path)
     try:
-        chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
-        (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
-        facts = read_json(text, Facts)
-        columns = _columns(path)
-        mission = facts.mission
-        age = _numbers(columns["/scene/robots age"]).reshape(-1, mission.num_robots)
-        centres_m = _numbers(columns["/scene/robots Cylinders3D:centers"])
-        position_m = centres_m.reshape(*age.shape, 3)[..., :2]
-        # Teams at rest have no headings, and in free space no robot is cut off.
-        none = pa.array(np.zeros(6 * age.size))
-        headings = _numbers(columns.get("/scene/heading LineStrips3D:strips", none))
-        start, end = np.moveaxis(headings.reshape(*age.shape, 2, 3), 2, 0)
-        cut_off = _numbers(columns.get("/scene/robots is_cut_off", none[: age.size]))
-        return Footage(
-            facts=facts,
-            window=_windows(columns, "/scene/robots"),
-            position_m=position_m,
-            velocity_mps=(end - start)[..., :2],
-            known_age=age,
-            is_cut_off=cut_off.reshape(age.shape) > 0.0,
-            mismatch=_mismatch(columns),
-            is_on=_numbers(columns["/scene/robots is_on"]).reshape(age.shape) > 0.0,
-            packets=_packets(columns),
-            age_mean=_numbers(columns["/plots/age/mean Measurements:values"]),
-            ground=shown_ground(position_m, mission),
-        )
+        return _footage(_facts(path), _columns(path))
     except (KeyError, ValueError, pa.ArrowException) as error:
         lack = "does not hold what a video shows, as replays of an earlier swarm-mj"
         raise ValueError(f"{path} {lack}; record it again") from error
 
 
+def _facts(path: Path) -> Facts:
+    chunks = RrdReader(path).stream().filter(content=f"/__properties/{FACTS}")
+    (text,) = (chunk.to_record_batch().column("json")[0].as_py()[0] for chunk in chunks)
+    return read_json(text, Facts)
+
+
+def _footage(facts: Facts, columns: Columns) -> Footage:
+    robots = layers.SCENE_ROBOTS.path
+    age = _numbers(columns[robots, "age"]).reshape(-1, facts.mission.num_robots)
+    centres_m = _numbers(columns[robots, "Cylinders3D:centers"]).reshape(*age.shape, 3)
+    position_m = centres_m[..., :2]
+    is_on = _numbers(columns[robots, "is_on"]).reshape(age.shape) > 0.0
+    velocity_mps = np.zeros((*age.shape, 2))
+    headings = columns.get((layers.SCENE_HEADINGS.path, "LineStrips3D:strips"))
+    if headings is not None:  # teams at rest have none
+        start_m, end_m = np.moveaxis(_numbers(headings).reshape(*age.shape, 2, 3), 2, 0)
+        velocity_mps = (end_m - start_m)[..., :2]
+    is_cut_off = np.zeros(age.shape, dtype=bool)
+    cut_off = columns.get((robots, "is_cut_off"))
+    if cut_off is not None:  # in free space no robot is
+        is_cut_off = _numbers(cut_off).reshape(age.shape) > 0.0
+    return Footage(
+        facts=facts,
+        window=_windows(columns, layers.SCENE_ROBOTS),
+        position_m=position_m,
+        velocity_mps=velocity_mps,
+        known_age=age,
+        is_cut_off=is_cut_off,
+        mismatch=_mismatch(columns),
+        is_on=is_on,
+        packets=_packets(columns),
+        age_mean=_numbers(columns[layers.MEAN_AGE.path, "Measurements:values"]),
+        ground=shown_ground(position_m, facts.mission),
+    )
+
+
 def _columns(path: Path) -> Columns:
     # In one pass: each reader decodes the file anew.
-    found: dict[str, list[pa.Table]] = {}
-    shown = ["/scene/**", "/plots/age/mean"]
+    found: dict[tuple[str, str], list[pa.Table]] = {}
+    shown = [layers.SCENE.contents, f"/{layers.MEAN_AGE.path}"]
     for chunk in RrdReader(path).stream().filter(content=shown, is_static=False):
         table = pa.table(chunk.to_record_batch())
+        entity = chunk.entity_path.removeprefix("/")
         for name in table.schema.names:
             column = table.select(list({TIMELINE, name}))
-            found.setdefault(f"{chunk.entity_path} {name}", []).append(column)
-    return {
-        path: pa.concat_tables(tables).sort_by(TIMELINE).column(path.split()[-1]).combine_chunks()
-        for path, tables in found.items()
-    }
+            found.setdefault((entity, name), []).append(column)
+    columns: Columns = {}
+    for (entity, name), tables in found.items():
+        whole = pa.concat_tables(tables).sort_by(TIMELINE)
+        columns[entity, name] = whole.column(name).combine_chunks()
+    return columns
 
 
-def _packets(columns: Columns) -> dict[str, PacketPaths]:
-    found = {}
+def _packets(columns: Columns) -> dict[Fate, PacketPaths]:
+    found: dict[Fate, PacketPaths] = {}
     for fate, style in palette.PACKETS.items():
-        if (strips := columns.get(f"/scene/packets/{fate} LineStrips3D:strips")) is not None:
-            points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)[..., :2]
-            # From the way that is drawn to the whole one.
-            start_m = points_m[:, 0]
-            way_m = (points_m[:, -1] - start_m) / style.share
-            found[fate] = PacketPaths(_rows(strips), start_m, start_m + way_m)
+        strips = columns.get((layers.PACKET_ARCS[fate].path, "LineStrips3D:strips"))
+        if strips is None:  # addressed packets have other fates than broadcasts
+            continue
+        points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)[..., :2]
+        start_m = points_m[:, 0]
+        # From the way that is drawn to the whole one.
+        way_m = (points_m[:, -1] - start_m) / style.share
+        found[fate] = PacketPaths(row=_rows(strips), start_m=start_m, end_m=start_m + way_m)
     return found
 
 
 def _mismatch(columns: Columns) -> LinkMismatch:
-    window, found = NO_MISMATCH.window, [NO_MISMATCH.links]
-    for kind, whose in itertools.product(palette.MISMATCH, ("", "others/")):
-        entity = f"/scene/world/{whose}{kind}"
-        if f"{entity} margin_db" in columns:
-            window = _windows(columns, entity)
-            row = _rows(columns[f"{entity} sender"])
-            links = np.zeros(len(row), LINK)
-            links["row"], links["is_too_weak"] = row, kind == "too_weak"
-            for name in NUMBERS:
-                links[name] = _numbers(columns[f"{entity} {name}"])
-            found.append(links)
+    window = NO_MISMATCH.window
+    found = [NO_MISMATCH.links]
+    for kind, layer in layers.SCENE_LINKS.items():
+        for entity in (layer, layers.of_others(layer)):
+            if (entity.path, "margin_db") in columns:
+                window = _windows(columns, entity)
+                found.append(_links(columns, entity, kind))
     links = np.concatenate(found)
-    return LinkMismatch(window, links[np.argsort(links["row"], kind="stable")])
+    return LinkMismatch(window=window, links=links[np.argsort(links["row"], kind="stable")])
+
+
+def _links(columns: Columns, layer: Lines3D, kind: LinkKind) -> LinkRows:
+    row = _rows(columns[layer.path, "sender"])
+    links = np.zeros(len(row), LINK)
+    links["row"] = row
+    links["is_too_weak"] = kind == "too_weak"
+    for name in NUMBERS:
+        links[name] = _numbers(columns[layer.path, name])
+    return links
 
 
 def _rows(column: pa.Array) -> Int[np.ndarray, "L"]:
@@ -144,9 +175,10 @@ def _rows(column: pa.Array) -> Int[np.ndarray, "L"]:
     return np.repeat(np.arange(len(per_window)), per_window)
 
 
-def _windows(columns: Columns, entity: str) -> Int[np.ndarray, "T"]:
+def _windows(columns: Columns, entity: Entity) -> Int[np.ndarray, "T"]:
     # An entity that was written in several parts has each window as often.
-    return np.unique(columns[f"{entity} {TIMELINE}"].to_numpy(zero_copy_only=False)).astype(int)
+    windows = columns[entity.path, TIMELINE].to_numpy(zero_copy_only=False)
+    return np.unique(windows).astype(int)
 
 
 def _numbers(column: pa.Array) -> Float[np.ndarray, "K"]:

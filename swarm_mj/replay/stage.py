@@ -1,13 +1,14 @@
 """The still things of a replay, on the map and in 3-D: the ground, walls and obstacles."""
 
 import itertools
-from typing import Any
+from typing import Literal, TypeAlias
 
 import numpy as np
 import rerun as rr
 from jaxtyping import Float, UInt8
 from mujoco._enums import mjtTextureRole  # private: type checkers see it only there
 from mujoco._functions import mj_kinematics, mju_mat2Quat
+from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
@@ -15,9 +16,10 @@ from swarm_mj.physics.arenas import loss_db_of, obstacle_geoms, obstacles_of
 from swarm_mj.physics.outlines import footprints
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import CAPSULE, CYLINDER, ELLIPSOID, ROBOT_HEIGHT_M, SPHERE
+from swarm_mj.replay import layers
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import lifted
-from swarm_mj.replay.rerun_log import LAYERS, RerunLog
+from swarm_mj.replay.rerun_log import RerunLog
 
 SQUARE_M = 100.0
 MAX_SQUARES = 60  # across the ground; more would be too small to see
@@ -26,7 +28,8 @@ FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an ob
 MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up
 PLANE = 0  # as MuJoCo numbers it
 FLOOR_M = 0.5  # half the thickness of a drawn plane: rerun has solids only
-GLASS = "transparentfillmajorwireframe"  # obstacles hide no robot
+FillMode: TypeAlias = Literal["solid", "transparentfillmajorwireframe"]
+GLASS: FillMode = "transparentfillmajorwireframe"  # obstacles hide no robot
 FAR_M = 1e4  # half the side of a plane that has no end
 
 
@@ -35,42 +38,56 @@ def draw_stage(out: RerunLog) -> None:
     mission = out.log.facts.mission
     spec = compose(mission, scene=out.log.scene)
     if not mission.has_walls:
-        # An open area's floor is as large as what is ever seen.
-        low, high = (end(out.ground.centre_m, axis=0) for end in (np.min, np.max))
-        for geom in (geom for geom in spec.geoms if geom.name == "floor"):
-            geom.pos = [*(low + high) / 2.0, 0.0]
-            geom.size = [*(high - low) / 2.0 + 1.5 * out.ground.reach_m, 1.0]
+        _widen_floor(spec, out.ground)
     model = spec.compile()
     _draw_ground(out, mission)
     for name, parts in static_geoms(model).items():
         for part in parts:
-            out.fixed(f"scene/area/{name}", part)
+            out.fixed(layers.SCENE_AREA.below(name), part)
     # On the map, where they are in the way of the antennas.
-    if outlines := footprints(obstacles_of(model), ROBOT_HEIGHT_M):
-        path = "arena/world/filling"
-        apart_m = FILL_SHARE * out.ground.reach_m
-        lines = [line for outline in outlines for line in filling(outline, apart_m)]
-        # The width is in metres, since rerun fills no areas.
-        style: dict[str, Any] = LAYERS[path].style | {"radii": 0.55 * apart_m}
-        out.fixed(path, rr.LineStrips2D.from_fields(strips=lines, **style))
-        out.fixed_layer("arena/world/obstacle", strips=outlines)
+    outlines = footprints(obstacles_of(model), ROBOT_HEIGHT_M)
+    if outlines:
+        _draw_obstacles(out, outlines)
+
+
+def _widen_floor(spec: MjSpec, ground: Ground) -> None:
+    """Make an open area's floor as large as what is ever seen."""
+    low_m = np.min(ground.centre_m, axis=0)
+    high_m = np.max(ground.centre_m, axis=0)
+    for geom in spec.geoms:
+        if geom.name == "floor":  # a scene of one's own may have none
+            geom.pos = [*(low_m + high_m) / 2.0, 0.0]
+            geom.size = [*(high_m - low_m) / 2.0 + 1.5 * ground.reach_m, 1.0]
+
+
+def _draw_obstacles(out: RerunLog, outlines_m: list[Float[np.ndarray, "_ 2"]]) -> None:
+    apart_m = FILL_SHARE * out.ground.reach_m
+    lines = []
+    for outline_m in outlines_m:
+        lines += filling(outline_m, apart_m)
+    # The width is in metres, since rerun fills no areas.
+    out.fixed(layers.FILLING, layers.FILLING.look(strips=lines, radii=0.55 * apart_m))
+    out.fixed(layers.OBSTACLES, layers.OBSTACLES.look(strips=outlines_m))
 
 
 def _draw_ground(out: RerunLog, mission: Mission) -> None:
     if out.ground.moves:
         away = lifted(-out.ground.centre_m, 0.0)
-        out.timed("scene", rr.Transform3D.columns(translation=away))
+        out.timed(layers.SCENE, rr.Transform3D.columns(translation=away))
         # rerun shows a timed transform whole or not at all, so the mirror is repeated.
         mirrors = np.tile(MIRROR, (len(away), 1, 1))
-        out.timed("arena", rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors))
+        columns = rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors)
+        out.timed(layers.ARENA, columns)
     else:
-        out.fixed("arena", rr.Transform3D(mat3x3=MIRROR))
+        out.fixed(layers.ARENA, rr.Transform3D(mat3x3=MIRROR))
     strips = grid(out.ground)
-    out.fixed_layer("arena/area/grid", strips=strips)
-    out.fixed_layer("scene/grid", strips=lifted(np.array(strips), GRID_M))
+    out.fixed(layers.GROUND_GRID, layers.GROUND_GRID.look(strips=strips))
+    raised_m = lifted(np.array(strips), GRID_M)
+    out.fixed(layers.SCENE_GRID, layers.SCENE_GRID.look(strips=raised_m))
     half = mission.half_side_m
     outline = [(-half, -half), (half, -half), (half, half), (-half, half), (-half, -half)]
-    out.fixed_layer(f"arena/area/{'walls' if mission.has_walls else 'outline'}", strips=[outline])
+    border = layers.WALLS if mission.has_walls else layers.OUTLINE
+    out.fixed(border, border.look(strips=[outline]))
 
 
 def square_m(ground: Ground) -> float:
@@ -84,23 +101,26 @@ def grid(ground: Ground) -> list[list[tuple[float, float]]]:
     square = square_m(ground)
     x_low, y_low = np.floor((np.min(ground.centre_m, axis=0) - ground.reach_m) / square)
     x_high, y_high = np.ceil((np.max(ground.centre_m, axis=0) + ground.reach_m) / square)
-    xs, ys = np.arange(x_low, x_high + 1) * square, np.arange(y_low, y_high + 1) * square
-    return [[(x, ys[0]), (x, ys[-1])] for x in xs] + [[(xs[0], y), (xs[-1], y)] for y in ys]
+    xs = np.arange(x_low, x_high + 1) * square
+    ys = np.arange(y_low, y_high + 1) * square
+    northward = [[(x, ys[0]), (x, ys[-1])] for x in xs]
+    eastward = [[(xs[0], y), (xs[-1], y)] for y in ys]
+    return northward + eastward
 
 
 def filling(
     outline_m: Float[np.ndarray, "K 2"], apart_m: float
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """Return lines from west to east, so far apart, that fill an outline [m]."""
-    y_low, y_high = np.min(outline_m[:, 1]), np.max(outline_m[:, 1])
+    y_low = np.min(outline_m[:, 1])
+    y_high = np.max(outline_m[:, 1])
     num = max(1, int(np.ceil((y_high - y_low) / apart_m)))
     lines = []
     for y in y_low + (np.arange(num) + 0.5) * (y_high - y_low) / num:
-        xs = [
-            a[0] + (y - a[1]) / (b[1] - a[1]) * (b[0] - a[0])
-            for a, b in itertools.pairwise(outline_m.tolist())
-            if min(a[1], b[1]) <= y < max(a[1], b[1])
-        ]
+        xs = []  # where the outline's edges cross this height: outlines are convex, so twice
+        for (x_a, y_a), (x_b, y_b) in itertools.pairwise(outline_m.tolist()):
+            if min(y_a, y_b) <= y < max(y_a, y_b):
+                xs.append(x_a + (y - y_a) / (y_b - y_a) * (x_b - x_a))
         lines.append(((min(xs), y), (max(xs), y)))
     return lines
 
@@ -111,40 +131,70 @@ def static_geoms(model: MjModel) -> dict[str, list[rr.AsComponents]]:
     Meshes and fields of heights are drawn as the boxes around them. Obstacles have their loss, for
     those who click on one.
     """
-    data, found = MjData(model), {}
+    data = MjData(model)
     mj_kinematics(model, data)
     stands_still = model.body_weldid[model.geom_bodyid] == 0
     obstacles = obstacle_geoms(model)
+    found = {}
     for g in np.flatnonzero(stands_still).tolist():
         name = model.geom(g).name or f"geom{g}"
-        loss = [rr.AnyValues(loss_db=loss_db_of(model, g))] if g in obstacles else []
-        found[name] = [_drawn(model, data, g, GLASS if g in obstacles else "solid"), *loss]
+        if g in obstacles:
+            loss = rr.AnyValues(loss_db=loss_db_of(model, g))
+            found[name] = [_drawn(model, data, g, GLASS), loss]
+        else:
+            found[name] = [_drawn(model, data, g, "solid")]
     return found
 
 
-def _drawn(model: MjModel, data: MjData, g: int, fill_mode: str) -> rr.AsComponents:
+def _drawn(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.AsComponents:
     quaternion = np.empty(4)
     mju_mat2Quat(quaternion, data.geom_xmat[g])
-    style: dict[str, Any] = {
-        "colors": [_colour(model, g)],
-        "quaternions": [rr.Quaternion(xyzw=np.roll(quaternion, -1))],
-        "fill_mode": fill_mode,
-    }
-    kind, size, place = model.geom_type[g], model.geom_size[g], data.geom_xpos[g]
+    turns = [rr.Quaternion(xyzw=np.roll(quaternion, -1))]
+    colours = [_colour(model, g)]
+    kind = model.geom_type[g]
+    size = model.geom_size[g]
+    place = data.geom_xpos[g]
     rotation = data.geom_xmat[g].reshape(3, 3)
     middle, half = np.split(model.geom_aabb[g], 2)
     if kind in (SPHERE, ELLIPSOID):
-        return rr.Ellipsoids3D(half_sizes=[half], centers=[place], **style)
-    if kind in (CYLINDER, CAPSULE):
-        style |= {"radii": [size[0]], "lengths": [2.0 * size[1]]}
-        if kind == CYLINDER:
-            return rr.Cylinders3D(centers=[place], **style)
+        return rr.Ellipsoids3D(
+            half_sizes=[half],
+            centers=[place],
+            quaternions=turns,
+            colors=colours,
+            fill_mode=fill_mode,
+        )
+    if kind == CYLINDER:
+        return rr.Cylinders3D(
+            radii=[size[0]],
+            lengths=[2.0 * size[1]],
+            centers=[place],
+            quaternions=turns,
+            colors=colours,
+            fill_mode=fill_mode,
+        )
+    if kind == CAPSULE:
         # Rerun's capsule begins at its place, MuJoCo's has its middle there.
-        return rr.Capsules3D(translations=[place - size[1] * rotation[:, 2]], **style)
+        return rr.Capsules3D(
+            radii=[size[0]],
+            lengths=[2.0 * size[1]],
+            translations=[place - size[1] * rotation[:, 2]],
+            quaternions=turns,
+            colors=colours,
+            fill_mode=fill_mode,
+        )
     if kind == PLANE:  # a plate whose upper face is the plane; sizes of 0 are without end
-        half = [*np.where(size[:2] > 0.0, size[:2], FAR_M), FLOOR_M]
-        return rr.Boxes3D(half_sizes=[half], centers=[place - FLOOR_M * rotation[:, 2]], **style)
-    return rr.Boxes3D(half_sizes=[half], centers=[place + rotation @ middle], **style)
+        half = np.append(np.where(size[:2] > 0.0, size[:2], FAR_M), FLOOR_M)
+        centre = place - FLOOR_M * rotation[:, 2]
+    else:
+        centre = place + rotation @ middle
+    return rr.Boxes3D(
+        half_sizes=[half],
+        centers=[centre],
+        quaternions=turns,
+        colors=colours,
+        fill_mode=fill_mode,
+    )
 
 
 def _colour(model: MjModel, g: int) -> UInt8[np.ndarray, "3"]:

@@ -13,10 +13,21 @@ import rerun_bindings as bindings
 
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second
-from swarm_mj.replay import charts, palette
+from swarm_mj.replay import charts, layers, palette
 from swarm_mj.replay.footage import frame
+from swarm_mj.replay.layers import Lines, Lines3D
 from swarm_mj.replay.layout import draw_legend, layout
-from swarm_mj.replay.links import PIECES, arcs, by_kind, divided, ends, is_other, lifted
+from swarm_mj.replay.links import (
+    PIECES,
+    LinkRows,
+    arcs,
+    by_kind,
+    divided,
+    ends,
+    is_other,
+    lifted,
+)
+from swarm_mj.replay.palette import LinkKind
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
@@ -28,6 +39,7 @@ TRAIL_STRIDE = 15
 TRAIL_EVERY = 5  # windows; in between, the last one is shown
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
+ASIDE_SHARE = 0.8 * RING_SHARE  # from a request to its answer, likewise
 RADIUS_SHARE = 1.4 * RING_SHARE  # of a body in 3-D, likewise
 OBSERVER = 1.3  # times larger
 BODY_HEIGHT = 0.8  # of a body, by its radius
@@ -66,7 +78,7 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
         charts.draw_states(out)
         charts.draw_plots(out)
         about = "\n".join([f"# {name}", *_about(log, config)])
-        out.fixed("about", rr.TextDocument(about, media_type="text/markdown"))
+        out.fixed(layers.ABOUT, rr.TextDocument(about, media_type="text/markdown"))
     return stream.read() or b""
 
 
@@ -75,9 +87,13 @@ def _application(log: Log) -> str:
     mission = log.facts.mission
     packets = "broadcasts" if log.facts.is_broadcast else "addressed packets"
     parts = [mission.task, f"{mission.num_robots} robots", f"{mission.side_m:.0f} m", packets]
-    parts += ["beyond free space"] if log.is_compared else []
-    parts += [log.task_cost.name] if log.task_cost else []
-    name = " - ".join([*parts, f"seen by r{log.ego}", "swarm_mj"])
+    if log.is_compared:
+        parts.append("beyond free space")
+    if log.task_cost is not None:
+        parts.append(log.task_cost.name)
+    parts.append(f"seen by r{log.ego}")
+    parts.append("swarm_mj")
+    name = " - ".join(parts)
     return re.sub(r"[^a-zA-Z0-9 _-]", "-", name)  # rerun warns of other characters
 
 
@@ -92,51 +108,59 @@ def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:
 
 def draw_team(out: RerunLog) -> None:
     """Draw everything that moves, the same on the map and in 3-D."""
-    log, radius_m = out.log, RADIUS_SHARE * out.ground.reach_m
+    log = out.log
+    radius_m = RADIUS_SHARE * out.ground.reach_m
     height_m = BODY_HEIGHT * radius_m
     _draw_robots(out)
     _draw_bodies(out, radius_m, height_m)
     if log.has_motion:
         _draw_motion(out, height_m)
+        _draw_trails(out)
+        _draw_beliefs(out)
     row, child = np.nonzero(log.has_parent)
     parent = log.parent[row, child]
-    out.lines("arena/tree", log.position_m[row, parent], log.position_m[row, child], row)
+    out.lines(layers.PARENTS, log.position_m[row, parent], log.position_m[row, child], row)
     _draw_radio(out)
+    _draw_packets(out)
     for fate, packets in log.packets.items():
         strips = arcs(packets, height_m, palette.PACKETS[fate].share)
-        out.layer(f"scene/packets/{fate}", packets.row, strips=strips)
+        out.strips(layers.PACKET_ARCS[fate], strips, packets.row)
     if log.is_compared:
-        _draw_mismatch(out, radius_m, height_m)
+        _draw_mismatch(out, height_m)
+        _draw_cut_off(out, radius_m)
 
 
 def _draw_robots(out: RerunLog) -> None:
     log = out.log
     names = [f"r{i}" for i in range(log.parent.shape[1])]
-    out.fixed("arena/robots", rr.Points2D.from_fields(labels=names, show_labels=False))
-    where = log.position_m.reshape(-1, 2)
-    out.layer("arena/robots", positions=where, colors=log.colours.reshape(-1, 3))
+    out.fixed(layers.ROBOTS, rr.Points2D.from_fields(labels=names, show_labels=False))
+    where_m = log.position_m.reshape(-1, 2)
+    out.points(layers.ROBOTS, where_m, colours=log.colours.reshape(-1, 3))
     row = np.arange(len(log.window))
-    where = log.position_m[:, log.ego]
+    where_m = log.position_m[:, log.ego]
     radius_m = 2.0 * RING_SHARE * out.ground.reach_m
-    out.rings("arena/ego", where, radius_m, row)
+    out.rings(layers.EGO, where_m, radius_m, row)
     # The name is a point's label, for rerun misplaces an ellipse's.
-    out.fixed("arena/ego/name", rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True))
-    out.layer("arena/ego/name", row, positions=where - (0.0, 3.0 * radius_m))
+    name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
+    out.fixed(layers.EGO_NAME, name)
+    out.points(layers.EGO_NAME, where_m - (0.0, 3.0 * radius_m), row)
 
 
 def _draw_bodies(out: RerunLog, radius_m: float, height_m: float) -> None:
-    # Those who click on one, and videos, read what is known of it.
-    log, path = out.log, "scene/robots"
+    log = out.log
+    entity = layers.SCENE_ROBOTS
     radii = np.full(log.is_on.shape[1], radius_m)
     radii[log.ego] *= OBSERVER
     lengths = np.full(len(radii), height_m)
-    out.fixed(path, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
-    where = lifted(log.position_m.reshape(-1, 2), height_m / 2.0)
-    out.things(path, rr.Cylinders3D.columns(centers=where, colors=log.colours.reshape(-1, 3)))
+    out.fixed(entity, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
+    where_m = lifted(log.position_m.reshape(-1, 2), height_m / 2.0)
+    colours = log.colours.reshape(-1, 3)
+    out.things(entity, rr.Cylinders3D.columns(centers=where_m, colors=colours))
+    # Those who click on one, and videos, read what is known of it.
     age = log.known_age.astype(np.float32).ravel()
-    out.things(path, rr.AnyValues.columns(age=age, is_on=log.is_on.ravel()))
+    out.things(entity, rr.AnyValues.columns(age=age, is_on=log.is_on.ravel()))
     if log.is_compared:
-        out.things(path, rr.AnyValues.columns(is_cut_off=log.is_cut_off.ravel()))
+        out.things(entity, rr.AnyValues.columns(is_cut_off=log.is_cut_off.ravel()))
 
 
 def _draw_motion(out: RerunLog, height_m: float) -> None:
@@ -145,64 +169,98 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     # All of one length, for agreement is in directions.
     length_m = HEADING_SHARE * out.ground.reach_m * out.scale
     way_m = length_m * log.velocity_mps / np.maximum(speed, 1e-9)
-    start, end = (at.reshape(-1, 2) for at in (log.position_m, log.position_m + way_m))
-    out.lines("arena/heading", start, end)
-    out.lines("scene/heading", lifted(start, height_m), lifted(end, height_m))
+    start_m = log.position_m.reshape(-1, 2)
+    end_m = (log.position_m + way_m).reshape(-1, 2)
+    out.lines(layers.HEADINGS, start_m, end_m)
+    out.lines(layers.SCENE_HEADINGS, lifted(start_m, height_m), lifted(end_m, height_m))
+
+
+def _draw_trails(out: RerunLog) -> None:
+    log = out.log
     # Trails are drawn anew every few windows only: they would be half the file.
     rows = np.arange(0, len(log.window), TRAIL_EVERY)
     past = range(0, TRAIL_WINDOWS + 1, TRAIL_STRIDE)
-    trail = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
-    out.fixed_layer("arena/trail")
-    columns = rr.LineStrips2D.columns(strips=trail.reshape(-1, len(past), 2))
-    out.timed("arena/trail", columns.partition([trail.shape[1]] * len(rows)), log.window[rows])
+    trail_m = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
+    num_robots = trail_m.shape[1]
+    out.fixed(layers.TRAILS, layers.TRAILS.look())
+    columns = rr.LineStrips2D.columns(strips=trail_m.reshape(-1, len(past), 2))
+    out.timed(layers.TRAILS, columns.partition([num_robots] * len(rows)), log.window[rows])
+
+
+def _draw_beliefs(out: RerunLog) -> None:
+    log = out.log
     row, other = np.nonzero(log.is_other_known)
-    believed = log.believed_m[row, other]
-    out.lines("arena/belief/error", believed, log.position_m[row, other], row)
-    out.rings("arena/belief/ring", believed, RING_SHARE * out.ground.reach_m, row)
+    believed_m = log.believed_m[row, other]
+    out.lines(layers.BELIEF_ERROR, believed_m, log.position_m[row, other], row)
+    out.rings(layers.BELIEF, believed_m, RING_SHARE * out.ground.reach_m, row)
 
 
 def _draw_radio(out: RerunLog) -> None:
     log = out.log
     row, sender = np.nonzero(log.is_transmitter)
-    where = log.position_m[row, sender]
-    out.rings("arena/radio/range", where, log.facts.mission.range_m, row)
+    where_m = log.position_m[row, sender]
+    out.rings(layers.RANGE, where_m, log.facts.mission.range_m, row)
     if log.facts.is_broadcast:
-        out.layer("arena/radio/transmitter", row, positions=where)
-    else:
-        lost = log.packets["lost"]
-        out.lines("arena/radio/lost/rest", lost.start_m, lost.end_m, lost.row)
-    aside_m = 0.8 * RING_SHARE * out.ground.reach_m  # an answer stands beside its request
-    aside = {"delivered": 0.0, "lost": 0.0, "answered": aside_m, "unanswered": aside_m}
-    for fate, (row, start_m, end_m) in log.packets.items():
-        path = f"arena/radio/{fate}"
-        if fate not in aside:
-            out.lines(path, start_m, end_m, row)
-            continue
-        way = end_m - start_m
-        length = np.maximum(np.linalg.norm(way, axis=1, keepdims=True), 1e-6)
-        origins = start_m + aside[fate] * (way[:, ::-1] * (-1.0, 1.0) / length)  # to the left
-        out.layer(path, row, origins=origins, vectors=palette.PACKETS[fate].share * way)
+        out.points(layers.TRANSMITTERS, where_m, row)
 
 
-def _draw_mismatch(out: RerunLog, radius_m: float, height_m: float) -> None:
+def _draw_packets(out: RerunLog) -> None:
     log = out.log
-    is_own = log.is_own(log.mismatch.links)
-    # The layout hides those of others: all of a city's would hide the map.
-    for whose, those in {"": is_own, "others/": ~is_own}.items():
-        for kind, links in by_kind(log.mismatch.links[those]).items():
-            at = log.mismatch.window[links["row"]] - log.window[0]
-            whole_m = ends(links, log.position_m, at)
-            # In 3-D they are whole, whatever their kind: dashes would make the file larger.
-            path = f"world/{whose}{kind}"
-            out.mismatch_lines(f"scene/{path}", links, lifted(whole_m, height_m))
-            each = np.repeat(links, len(PIECES[kind]))
-            out.mismatch_lines(f"arena/{path}", each, divided(whole_m, PIECES[kind]))
+    if not log.facts.is_broadcast:
+        lost = log.packets["lost"]
+        out.lines(layers.LOST_REST, lost.start_m, lost.end_m, lost.row)
+    for fate, packets in log.packets.items():
+        if fate in layers.PACKET_LINES:
+            line = layers.PACKET_LINES[fate]
+            out.lines(line, packets.start_m, packets.end_m, packets.row)
+            continue
+        way_m = packets.end_m - packets.start_m
+        origins_m = packets.start_m
+        if fate in ("answered", "unanswered"):  # an answer stands beside its request, to the left
+            length_m = np.maximum(np.linalg.norm(way_m, axis=1, keepdims=True), 1e-6)
+            aside_m = ASIDE_SHARE * out.ground.reach_m
+            origins_m = origins_m + aside_m * (way_m[:, ::-1] * (-1.0, 1.0) / length_m)
+        vectors_m = palette.PACKETS[fate].share * way_m
+        out.arrows(layers.PACKET_ARROWS[fate], origins_m, vectors_m, packets.row)
+
+
+def _draw_mismatch(out: RerunLog, height_m: float) -> None:
+    links = out.log.mismatch.links
+    is_own = out.log.is_own(links)
+    for kind, those in by_kind(links[is_own]).items():
+        _draw_links(out, kind, those, layers.LINKS[kind], layers.SCENE_LINKS[kind], height_m)
+    for kind, those in by_kind(links[~is_own]).items():
+        on_map = layers.of_others(layers.LINKS[kind])
+        in_scene = layers.of_others(layers.SCENE_LINKS[kind])
+        _draw_links(out, kind, those, on_map, in_scene, height_m)
+
+
+def _draw_links(
+    out: RerunLog,
+    kind: LinkKind,
+    links: LinkRows,
+    on_map: Lines,
+    in_scene: Lines3D,
+    height_m: float,
+) -> None:
+    log = out.log
+    at = log.mismatch.window[links["row"]] - log.window[0]
+    whole_m = ends(links, log.position_m, at)
+    # In 3-D they are whole, whatever their kind: dashes would make the file larger.
+    out.mismatch_lines(in_scene, kind, links, lifted(whole_m, height_m))
+    pieces = PIECES[kind]
+    each = np.repeat(links, len(pieces))
+    out.mismatch_lines(on_map, kind, each, divided(whole_m, pieces))
+
+
+def _draw_cut_off(out: RerunLog, radius_m: float) -> None:
+    log = out.log
     row, robot = np.nonzero(log.is_cut_off)
     where_m = log.position_m[row, robot]
-    out.layer("arena/world/cut_off", row, positions=where_m)
-    path = "scene/world/cut_off"
-    out.fixed(path, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
+    out.points(layers.CUT_OFF, where_m, row)
+    entity = layers.SCENE_CUT_OFF
+    out.fixed(entity, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
     radii = np.full(len(row), palette.HALO * radius_m)
     lengths = np.full(len(row), HALO_M)
     halos = rr.Cylinders3D.columns(centers=lifted(where_m, 0.0), radii=radii, lengths=lengths)
-    out.things(path, halos, row)
+    out.things(entity, halos, row)

@@ -105,9 +105,9 @@ def test_edges_lead_from_hop_to_hop_and_no_two_robots_share_a_place(replay, two_
 )
 def test_the_packet_plot_counts_as_the_costs_do(flight, names, request):
     recorded = request.getfixturevalue(flight)
-    _, curves, *_ = plots(recorded.log).values()
-    assert [curve.path for curve in curves] == [f"radio/{name}" for name in names]
-    for curve, name in zip(curves, names, strict=True):
+    _, plot, *_ = plots(recorded.log)
+    assert [curve.entity.path for curve in plot.curves] == [f"plots/radio/{name}" for name in names]
+    for curve, name in zip(plot.curves, names, strict=True):
         counts = recorded.counted(name)
         expected = [sum(counts[max(0, t - 9) : t + 1]) for t in range(len(counts))]
         np.testing.assert_array_equal(curve.values, expected)
@@ -127,7 +127,7 @@ def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_r
         weak.append(100.0 * num_weak / num_near)
         works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
         cut_off.append(100.0 * log.is_cut_off[window - 1].tolist().count(True) / 13)
-    shares = {curve.name: curve.values for curve in list(plots(log).values())[2]}
+    shares = {curve.name: curve.values for curve in plots(log)[2].curves}
     for name, values in expected.items():
         np.testing.assert_allclose(shares[name], values)
     shown = column(blocked_replay, "/plots/world/cut_off_from_r4", "Scalars:scalars")

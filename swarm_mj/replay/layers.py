@@ -1,0 +1,311 @@
+"""The layers of a replay: each entity's path and look, and what the legend says of the map's.
+
+A layer is one entry here. `write`, `stage` and `charts` draw it by its name in this module, `read`
+finds it by the same name, and a view of the layout shows whatever is below the view's path.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import NamedTuple, TypeAlias, TypeVar
+
+import numpy as np
+import rerun as rr
+from jaxtyping import Float, UInt8
+
+from swarm_mj.replay import palette
+from swarm_mj.replay.links import DASHES, WHOLE, by_kind
+from swarm_mj.replay.palette import Colour, Fate, LinkKind
+from swarm_mj.replay.recorder import Log
+
+Point: TypeAlias = tuple[float, float]
+Strips: TypeAlias = Sequence[Sequence[Point]] | Sequence[np.ndarray] | np.ndarray
+Colours: TypeAlias = UInt8[np.ndarray, "_ 3"]
+
+
+@dataclass(frozen=True, kw_only=True)
+class Entity:
+    """A place in rerun's recording, where things of one kind are kept."""
+
+    path: str
+
+    def below(self, name: str) -> "Entity":
+        """Return the entity of this name below this one."""
+        return Entity(path=f"{self.path}/{name}")
+
+
+@dataclass(frozen=True, kw_only=True)
+class View(Entity):
+    """An entity that a view of the layout shows, with all that is below it."""
+
+    @property
+    def contents(self) -> str:
+        """What the view shows, in rerun's words."""
+        return f"/{self.path}/**"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Layer(Entity):
+    """An entity whose things are drawn alike in every window."""
+
+    colour: Colour | None  # None: each thing has its own
+    width: float  # of lines, or the radius of points, on the screen [points]
+
+    @property
+    def colours(self) -> list[Colour] | None:
+        """The colour as rerun takes it, for all things."""
+        return None if self.colour is None else [self.colour]
+
+    @property
+    def radii(self) -> float:
+        """The width as rerun takes it: what is below 0 is in points on the screen."""
+        return -self.width
+
+
+@dataclass(frozen=True, kw_only=True)
+class FlatLayer(Layer):
+    """A layer in 2-D, where what is drawn last covers the rest."""
+
+    order: float  # the higher is drawn over the lower
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lines(FlatLayer):
+    """Lines in 2-D."""
+
+    def look(self, strips: Strips | None = None, radii: float | None = None) -> rr.LineStrips2D:
+        """Return the look, and lines that never change; `radii` replaces the layer's own."""
+        return rr.LineStrips2D.from_fields(
+            strips=strips,
+            radii=self.radii if radii is None else radii,
+            colors=self.colours,
+            draw_order=self.order,
+        )
+
+    def columns(self, strips: Strips, colours: Colours | None = None) -> rr.ComponentColumnList:
+        """Return lines that change, each in its colour if the layer has none."""
+        return rr.LineStrips2D.columns(strips=strips, colors=colours)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Arrows(FlatLayer):
+    """Arrows in 2-D."""
+
+    def look(
+        self, origins: Sequence[Point] | None = None, vectors: Sequence[Point] | None = None
+    ) -> rr.Arrows2D:
+        """Return the look, and arrows that never change."""
+        return rr.Arrows2D.from_fields(
+            origins=origins,
+            vectors=vectors,
+            radii=self.radii,
+            colors=self.colours,
+            draw_order=self.order,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rings(FlatLayer):
+    """Circles in 2-D, whose width is that of their line."""
+
+    def look(
+        self, centers: Sequence[Point] | None = None, half_sizes: Sequence[Point] | None = None
+    ) -> rr.Ellipses2D:
+        """Return the look, and circles that never change."""
+        return rr.Ellipses2D.from_fields(
+            centers=centers,
+            half_sizes=half_sizes,
+            line_radii=self.radii,
+            colors=self.colours,
+            draw_order=self.order,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Points(FlatLayer):
+    """Points in 2-D."""
+
+    shrinks: bool = True  # in large teams, where robots would cover each other
+
+    def look(self, positions: Sequence[Point] | None = None, scale: float = 1.0) -> rr.Points2D:
+        """Return the look, and points that never change; `scale` is of their size."""
+        return rr.Points2D.from_fields(
+            positions=positions,
+            radii=scale * self.radii,
+            colors=self.colours,
+            draw_order=self.order,
+        )
+
+
+@dataclass(frozen=True, kw_only=True)
+class Lines3D(Layer):
+    """Lines in 3-D."""
+
+    def look(self, strips: Strips | None = None) -> rr.LineStrips3D:
+        """Return the look, and lines that never change."""
+        return rr.LineStrips3D.from_fields(strips=strips, radii=self.radii, colors=self.colours)
+
+    def columns(self, strips: Strips, colours: Colours | None = None) -> rr.ComponentColumnList:
+        """Return lines that change, each in its colour if the layer has none."""
+        return rr.LineStrips3D.columns(strips=strips, colors=colours)
+
+
+# What a map is made of.
+Flat: TypeAlias = Lines | Arrows | Rings | Points
+AnyLayer = TypeVar("AnyLayer", bound=Layer)
+
+
+def of_others(layer: AnyLayer) -> AnyLayer:
+    """Return the layer of the links between others, which look like the observer's."""
+    # An entity of their own, which the layout hides: all of a city's would hide the map.
+    above, _, name = layer.path.rpartition("/")
+    return replace(layer, path=f"{above}/others/{name}")
+
+
+# The map, from the ground up.
+ARENA = View(path="arena")
+GROUND_GRID = Lines(path="arena/area/grid", colour=palette.GRID, width=0.5, order=-20.0)
+OUTLINE = Lines(path="arena/area/outline", colour=palette.OUTLINE, width=1.5, order=-19.0)
+WALLS = Lines(path="arena/area/walls", colour=palette.WALL, width=1.5, order=-19.0)
+FILLING = Lines(path="arena/world/filling", colour=palette.OBSTACLE, width=0.5, order=-11.0)
+OBSTACLES = Lines(path="arena/world/obstacle", colour=palette.WALL, width=0.8, order=-10.0)
+TRAILS = Lines(path="arena/trail", colour=palette.TRAIL, width=1.0, order=-5.0)
+RANGE = Rings(path="arena/radio/range", colour=palette.RANGE, width=0.6, order=1.0)
+UNBELIEVED = Lines(path="arena/world/unbelieved", colour=None, width=0.6, order=2.0)
+TOO_WEAK = Lines(path="arena/world/too_weak", colour=None, width=0.5, order=2.5)
+BELIEF_ERROR = Lines(path="arena/belief/error", colour=palette.BELIEF_ERROR, width=0.6, order=3.0)
+BELIEF = Rings(path="arena/belief/ring", colour=palette.BELIEF, width=0.8, order=4.0)
+PARENTS = Lines(path="arena/tree", colour=palette.TREE, width=0.8, order=6.0)
+OVERHEARD = Lines(
+    path="arena/radio/overheard",
+    colour=palette.PACKETS["overheard"].colour,
+    width=0.7,
+    order=10.0,
+)
+HEARD = Lines(path="arena/radio/heard", colour=palette.BROADCAST, width=1.0, order=18.0)
+UNANSWERED = Arrows(
+    path="arena/radio/unanswered",
+    colour=palette.PACKETS["unanswered"].colour,
+    width=1.2,
+    order=18.0,
+)
+LOST_REST = Lines(path="arena/radio/lost/rest", colour=palette.LOST_REST, width=0.7, order=18.0)
+LOST = Arrows(path="arena/radio/lost", colour=palette.LOST, width=1.8, order=19.0)
+DELIVERED = Arrows(path="arena/radio/delivered", colour=palette.DELIVERED, width=2.0, order=20.0)
+ANSWERED = Arrows(path="arena/radio/answered", colour=palette.ANSWERED, width=1.5, order=21.0)
+CUT_OFF = Points(path="arena/world/cut_off", colour=palette.CUT_OFF, width=12.0, order=24.0)
+TRANSMITTERS = Points(
+    path="arena/radio/transmitter", colour=palette.BROADCAST, width=9.0, order=25.0
+)
+HEADINGS = Lines(path="arena/heading", colour=palette.HEADING, width=0.8, order=29.0)
+ROBOTS = Points(path="arena/robots", colour=None, width=5.5, order=30.0)
+EGO_NAME = Points(path="arena/ego/name", colour=palette.EGO, width=0.1, order=30.0)
+EGO = Rings(path="arena/ego", colour=palette.EGO, width=1.2, order=31.0)
+
+# The ego robot's tree.
+TREE = View(path="tree")
+TREE_HOPS = Lines(path="tree/hops", colour=palette.GRID, width=0.5, order=0.0)
+TREE_EDGES = Lines(path="tree/edges", colour=palette.TREE, width=0.8, order=1.0)
+TREE_NODES = Points(path="tree/nodes", colour=None, width=4.5, order=2.0, shrinks=False)
+
+# The ages of all pairs, and the radio of every robot.
+AGES = Entity(path="ages")
+STATES = View(path="state")
+NOW = Lines(path="state/now", colour=palette.TEXT, width=0.6, order=1.0)
+STATE_ROBOTS = STATES.below("robots")
+STATE_WINDOWS = STATES.below("windows")
+
+# The scene in 3-D. Robots and halos are solids, whose sizes are in metres.
+SCENE = View(path="scene")
+SCENE_AREA = View(path="scene/area")
+SCENE_ROBOTS = SCENE.below("robots")
+SCENE_CUT_OFF = SCENE.below("world/cut_off")
+SCENE_GRID = Lines3D(path="scene/grid", colour=palette.OUTLINE, width=0.5)
+SCENE_HEADINGS = Lines3D(path="scene/heading", colour=palette.HEADING, width=0.8)
+SCENE_UNBELIEVED = Lines3D(path="scene/world/unbelieved", colour=None, width=0.6)
+SCENE_TOO_WEAK = Lines3D(path="scene/world/too_weak", colour=None, width=0.5)
+
+# The charts, the legend, and a sheet of text.
+AGE_PLOT = View(path="plots/age")
+PACKET_PLOT = View(path="plots/radio")
+LINK_PLOT = View(path="plots/world")
+COST_PLOT = View(path="plots/task")
+MEAN_AGE = AGE_PLOT.below("mean")
+LEGEND = View(path="legend")
+ABOUT = Entity(path="about")
+
+# By what they show: packets by their fate, links by how channel and belief differ.
+PACKET_LINES: dict[Fate, Lines] = {"overheard": OVERHEARD, "heard": HEARD}
+PACKET_ARROWS: dict[Fate, Arrows] = {
+    "unanswered": UNANSWERED,
+    "lost": LOST,
+    "delivered": DELIVERED,
+    "answered": ANSWERED,
+}
+PACKET_ARCS: dict[Fate, Lines3D] = {
+    fate: Lines3D(path=f"scene/packets/{fate}", colour=style.colour, width=1.0)
+    for fate, style in palette.PACKETS.items()
+}
+LINKS: dict[LinkKind, Lines] = {"unbelieved": UNBELIEVED, "too_weak": TOO_WEAK}
+SCENE_LINKS: dict[LinkKind, Lines3D] = {
+    "unbelieved": SCENE_UNBELIEVED,
+    "too_weak": SCENE_TOO_WEAK,
+}
+
+
+class Sample(NamedTuple):
+    """What the legend shows of one layer of the map."""
+
+    text: str
+    layer: Flat
+    colour: Colour | None = None  # where each thing of the layer has its own
+    radius: float = 0.0  # of a ring, in units of the legend
+    share: float = 1.0  # of the way that an arrow covers
+    pieces: Float[np.ndarray, "P 2"] = WHOLE  # that a line is drawn in
+
+
+def legend(log: Log) -> list[list[Sample]]:
+    """Return the legend's rows: the radio, what else is shown, mismatched links."""
+    packets = _packet_samples(log)
+    others = []
+    if log.has_motion:
+        others.append(Sample("heading", HEADINGS))
+        others.append(Sample(f"r{log.ego}'s belief", BELIEF, radius=0.8))
+    others.append(Sample(f"r{log.ego}'s tree", PARENTS))
+    # Beyond free space, the circle is what the range would be.
+    text = "range in\nfree space" if log.is_compared else "radio range"
+    reach = Sample(text, RANGE, radius=2.0)
+    if log.facts.is_broadcast:
+        packets.append(reach)
+    else:  # the four fates of addressed packets fill their row
+        others.append(reach)
+    rows = [packets, others]
+    if links := _link_samples(log):
+        rows.append(links)
+    return rows
+
+
+def _packet_samples(log: Log) -> list[Sample]:
+    if log.facts.is_broadcast:
+        return [Sample("transmits", TRANSMITTERS), Sample("is heard by", HEARD)]
+    return [
+        Sample("delivered", DELIVERED),
+        Sample("lost", LOST, share=palette.LOST_SHARE),
+        Sample("answered", ANSWERED),
+        Sample("overheard", OVERHEARD),
+    ]
+
+
+def _link_samples(log: Log) -> list[Sample]:
+    if not log.is_compared:
+        return []
+    samples = []
+    links = by_kind(log.mismatch.links)
+    if len(links["too_weak"]) > 0:
+        colour = palette.MISMATCH["too_weak"]
+        samples.append(Sample("believed,\ntoo weak", TOO_WEAK, colour=colour, pieces=DASHES))
+    if len(links["unbelieved"]) > 0:
+        colour = palette.MISMATCH["unbelieved"]
+        samples.append(Sample("works,\nunbelieved", UNBELIEVED, colour=colour))
+    if np.any(log.is_cut_off):
+        samples.append(Sample(f"cut off\nfrom r{log.ego}", CUT_OFF))
+    return samples
