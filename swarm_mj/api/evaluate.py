@@ -10,9 +10,9 @@ from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.flying import fly_study
-from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results import Evaluated, Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
-from swarm_mj.evaluation.summary import Evaluated, study_results, write_evaluated
+from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import Components
