@@ -107,11 +107,11 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     name = numbers["task_cost_name"]
     if name not in (None, Flocking.cost_name):
         return _cost(numbers, "task_cost", name, numbers["task_cost_unit"], 2)
-    if mission.task == "stationary":
+    if not mission.moves:
         return {}
     rows = _cost(numbers, "velocity_variance", "velocity variance", "m²/s²", 4)
     left = numbers["velocity_variance_left"]
-    if mission.task == "flocking" and left is not None:
+    if mission.flocks and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
         verdict = "yes" if left < AGREED else "no"
         rows[f"  flock agreed: under {AGREED:.0%} is left"] = f"{verdict}, {share}"

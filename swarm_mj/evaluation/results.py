@@ -314,17 +314,17 @@ def _task_cost_meaning(result: Result) -> str:
     return f"Task cost: {cost}, mean over windows ± standard error over missions."
 
 
-def _is_flock(result: Result) -> bool:
-    """Return whether the velocity variance is what the task is about."""
+def is_flock(result: Result) -> bool:
+    """Return whether the robots were to agree on one velocity."""
     return result.task == "flocking"
 
 
 def _shows_variance(result: Result) -> bool:
-    return _is_flock(result) and not has_own_cost(result)
+    return is_flock(result) and not has_own_cost(result)
 
 
 def _variance_meaning(result: Result) -> str:
-    if not _is_flock(result):
+    if not is_flock(result):
         return ""
     return "Velocity variance (var.): of the robots' velocities [m²/s²]."
 
@@ -332,7 +332,7 @@ def _variance_meaning(result: Result) -> str:
 def _published(result: Result) -> str:
     age = plus_minus(result.published_aoi_mean, result.published_aoi_sem)
     variance = result.published_velocity_variance_mean
-    if variance is None or not _is_flock(result):
+    if variance is None or not is_flock(result):
         return age
     return f"{age}\n{variance:.4f}"
 
@@ -429,7 +429,7 @@ WIDE = (
         applies=_shows_variance,
     ),
     Shown(
-        heading=lambda result: "published\nAoI, var." if _is_flock(result) else "published\nAoI",
+        heading=lambda result: "published\nAoI, var." if is_flock(result) else "published\nAoI",
         cell=_published,
         meaning=_published_meaning,
         applies=lambda result: not has_own_cost(result),

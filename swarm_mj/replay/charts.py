@@ -170,7 +170,7 @@ def plots(log: Log) -> dict[str, list[PlotCurve]]:
         named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
         found[f"Share [%]: {named}"] = _mismatch_curves(log)
     cost = log.task_cost
-    if cost is None and log.facts.mission.task == "flocking":
+    if cost is None and log.facts.mission.flocks:
         variance = log.velocity_variance_m2ps2
         cost = TaskCost(name="velocity variance", unit="m²/s²", value=variance)
     if cost is not None:
