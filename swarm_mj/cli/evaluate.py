@@ -83,10 +83,10 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
 
 def run(options: EvaluateOptions) -> int:
     """Run the command; return its exit code."""
-    return fly(options, options.study)
+    return run_study(options, options.study)
 
 
-def fly(options: StudyFlags, study: Study) -> int:
+def run_study(options: StudyFlags, study: Study) -> int:
     """Fly a study as asked, and write its results; return the exit code."""
     need("scipy", "an evaluation")
     kinds = ("json", "csv", "parquet")

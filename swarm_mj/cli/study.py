@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli import EPILOGS, OPTIONS
-from swarm_mj.cli.evaluate import StudyFlags, fly
+from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import missions_of
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.mission import Mission
@@ -42,7 +42,7 @@ def run(options: StudyOptions) -> int:
     if len(named) != len(TAKES[action].split()):
         raise ValueError(f"study {action} takes {TAKES[action]}, not {' '.join(named)}")
     if action == "run":
-        return fly(options, read_study(*named))
+        return run_study(options, read_study(*named))
     if options != StudyOptions(action=action, named=named):
         raise ValueError("study compare prints what it finds; leave out the options")
     need("scipy", "a comparison")
