@@ -5,7 +5,7 @@ import pytest
 from jaxtyping import TypeCheckError
 from sampled_types import CHECKED_CALLS
 
-from swarm_mj.evaluation.summary import standard_error
+from swarm_mj.evaluation.samples import standard_error
 
 SQUARE = np.ones((2, 2))  # where a row is due
 

@@ -28,7 +28,7 @@ import reproduce
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
-from swarm_mj.cli.evaluate import StudyFlags, fly
+from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.study import read_study
 from swarm_mj.evaluation.study import Study
 from swarm_mj.system.exit_codes import DONE
@@ -105,7 +105,7 @@ def fly_study(settings: Settings, name: str) -> int:
     say(f"{name}: {study.num_missions:,} missions")
     how = {"jobs": settings.jobs, "resume": not settings.force, "force": settings.force}
     with redirect_stdout(io.StringIO()):  # the tables are printed nowhere: they are in the docs
-        code = fly(StudyFlags(csv=drafts[0], parquet=drafts[1], **how), study)
+        code = run_study(StudyFlags(csv=drafts[0], parquet=drafts[1], **how), study)
     for draft, target in zip(drafts, targets, strict=True):
         if code == DONE:
             write_bytes(target, read_file(draft, "draft", MAX_BYTES))

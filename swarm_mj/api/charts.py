@@ -14,7 +14,7 @@ from matplotlib.ticker import LogLocator
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures import style
 from swarm_mj.evaluation.figures.style import look_of
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, is_flock
 from swarm_mj.evaluation.table import missions_of
 
 Course = Float[np.ndarray, "T"]
@@ -103,7 +103,7 @@ def draw_learning(
 
 
 def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:
-    costs = ["aoi", "velocity_variance"] if shown[0].task == "flocking" else ["aoi"]
+    costs = ["aoi", "velocity_variance"] if is_flock(shown[0]) else ["aoi"]
     axes = list(part.subplots(1, len(costs), sharey="row", squeeze=False).flat)
     for each, cost in zip(axes, costs, strict=True):
         for place, result in enumerate(shown):

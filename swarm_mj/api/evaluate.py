@@ -10,9 +10,9 @@ from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.flying import fly_study
-from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results import Evaluated, Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
-from swarm_mj.evaluation.summary import Evaluated, study_results, write_evaluated
+from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import listed, missions_memory
@@ -39,11 +39,23 @@ RESULT, RESULT_IN_FILE = 1000.0, 300.0
 class Evaluation:
     """Costs of policies on the same missions; tables need pandas, charts matplotlib.
 
-    `mission` has the missions' numbers, `results` each policy's costs, in the order named.
+    Printed, it is the table of `swarm-mj evaluate`.
+
+    Example:
+        ```python
+        import swarm_mj
+
+        found = swarm_mj.evaluate(
+            ["tdma", "mst"], "random-walk", num_missions=3, num_robots=8, num_windows=50
+        )
+        print(found)
+        print(found.summary["tdma"].aoi_mean)  # [windows]
+        found.save("results.csv")
+        ```
     """
 
-    mission: Mission
-    results: Sequence[Evaluated]
+    mission: Mission  # the missions' numbers
+    results: Sequence[Evaluated]  # each policy's costs, in the order named
 
     def __repr__(self) -> str:
         """Return the table that `swarm-mj evaluate` prints."""
@@ -64,10 +76,18 @@ class Evaluation:
         return [each.result for each in self.results]
 
     def to_dataframe(self, *, by_mission: bool = False) -> "DataFrame":
-        """Return one row per policy, with the columns of `swarm-mj evaluate --csv`.
+        """Return the costs as a table of pandas.
 
-        By mission, return one row per policy and mission instead: `policy`, `seed`, `aoi`
-        [windows], `velocity_variance` [m²/s²], and `task_cost` where the task has one.
+        Args:
+            by_mission: Whether to return a row per policy and mission.
+
+        Returns:
+            A row per policy, with the columns of `swarm-mj evaluate --csv`. By mission instead
+            `policy`, `seed`, `aoi` [windows], `velocity_variance` [m²/s²], and `task_cost`, in
+            the unit of the controller, where the task has one.
+
+        Raises:
+            ModuleNotFoundError: pandas is missing; the message says how to install it.
         """
         need("pandas", "a table")
         from pandas import DataFrame
@@ -76,27 +96,45 @@ class Evaluation:
             table = DataFrame(asdict(each) for each in self._rows)
             others = table.columns.difference([*FIRST, *LAST], sort=False)
             return table.reindex(columns=[*FIRST, *others, *LAST])
-        rows = [
-            {"policy": each.result.policy, "seed": each.result.seed + index, "aoi": aoi}
-            | {"velocity_variance": each.velocity_variance[index]}
-            | ({} if each.task_cost is None else {"task_cost": each.task_cost[index]})
-            for each in self.results
-            for index, aoi in enumerate(each.aoi)
-        ]
+        rows: list[dict[str, str | int | float]] = []
+        for each in self.results:
+            for index in range(len(each.aoi)):
+                row: dict[str, str | int | float] = {
+                    "policy": each.result.policy,
+                    "seed": each.result.seed + index,
+                }
+                for name, costs in each.costs.items():
+                    row[name] = costs[index]
+                rows.append(row)
         return DataFrame(rows)
 
     def plot(self) -> "Figure":
-        """Draw each policy's age of information, lowest first, with its 95 % interval."""
+        """Draw each policy's age of information, lowest first, with its 95 % interval.
+
+        Returns:
+            matplotlib's figure; of a flock it has the velocity variance as well.
+
+        Raises:
+            ModuleNotFoundError: matplotlib is missing; the message says how to install it.
+        """
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_evaluation
 
         return draw_evaluation(self._rows)
 
     def save(self, path: str | Path) -> Path:
-        """Write what `swarm-mj evaluate` does, replacing the file if it exists; return the path.
+        """Write what `swarm-mj evaluate` does, replacing the file if it exists.
 
-        It ends in .csv, one row per policy, .json, with what each mission cost, or .parquet, one
-        row per mission. Raises ValueError for another ending, OSError if it cannot be written.
+        Args:
+            path: Ends in .csv, one row per policy, .json, with what each mission cost as well, or
+                .parquet, one row per mission.
+
+        Returns:
+            The path.
+
+        Raises:
+            ValueError: The path ends otherwise.
+            OSError: The file cannot be written.
         """
         path = Path(path)
         check_outputs(Output("the file", path, ".csv|.json|.parquet"))
@@ -145,11 +183,27 @@ def evaluate(
             `if __name__ == "__main__":`, as Python's multiprocessing says.
         engine: Where they are: "local", "ray" or "slurm"; docs/cluster.md tells more.
         address: Of a running Ray cluster, such as "auto"; unless given, Ray starts one here.
-        **mission_fields: Any field of `Mission`, such as `num_robots=20`.
+        **mission_fields: Any field of `Mission`, in its unit, such as `num_robots=20`.
 
-    Raises ValueError for a value that is unknown or out of range, or if memory does not suffice;
-    TypeError for an argument of the wrong kind or an unknown name; ModuleNotFoundError without
-    SciPy, which finds intervals; KeyboardInterrupt by Ctrl-C, and nothing is kept.
+    Returns:
+        The costs: a table when printed, `summary` by policy, tables of pandas, a chart, and files.
+
+    Raises:
+        ValueError: A value is unknown or out of range, or memory does not suffice.
+        TypeError: An argument is of the wrong kind, or unknown.
+        ModuleNotFoundError: SciPy is missing, which finds intervals, or what the engine needs.
+        OSError: The engine could not do all of it.
+        KeyboardInterrupt: Ctrl-C; nothing is kept.
+
+    Example:
+        ```python
+        import swarm_mj
+
+        found = swarm_mj.evaluate(
+            ["planner", "tdma"], "stationary", num_missions=5, num_robots=8, num_windows=50
+        )
+        print(found)  # the first policy is the baseline
+        ```
     """
     need("scipy", "an evaluation")
     mission = mission_of(evaluate, task, mission_fields)

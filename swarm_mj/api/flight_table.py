@@ -26,8 +26,11 @@ FATES = {  # rows of the table: a count among the numbers, and its share of the 
 
 def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[str, Any]:
     """Return the summary of the one mission flown, and its packets; None is what is undefined."""
-    numbers: dict[str, Any] = {name: _number(name, x) for name, x in asdict(summary).items()}
-    first, last = numbers["velocity_variance_first"], numbers["velocity_variance_last"]
+    numbers: dict[str, Any] = {}
+    for name, value in asdict(summary).items():
+        numbers[name] = _number(name, value)
+    first = numbers["velocity_variance_first"]
+    last = numbers["velocity_variance_last"]
     packet_bytes = policy.packet(mission).num_bytes
     flown_s = numbers["num_windows"] * mission.window_s
     return numbers | {
@@ -41,7 +44,9 @@ def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[s
 
 def flight_title(mission: Mission, policy: str, seed: int) -> str:
     """Return mission, policy and seed in a line."""
-    team = f"{mission.num_robots} robots" + (" that collide" if mission.collide else "")
+    team = f"{mission.num_robots} robots"
+    if mission.collide:
+        team += " that collide"
     if mission.failure_fraction:
         team += f", {mission.failure_fraction:.0%} of them off half-way"
     return ", ".join([mission.task, policy, team, f"seed {seed}", *where_flown(mission)])
@@ -49,23 +54,29 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
     """Return the rows of a flight's table, at most 16, from its `flight_numbers`."""
-    hops, complete = numbers["hops_mean"], numbers["complete_window"]
-    payload, rate = numbers["payload"], BITS_PER_BYTE * numbers["bytes_per_second"]
-    rows = {
-        f"windows of {mission.window_s:g} s flown": f"{numbers['num_windows']} in {wall_s:.2f} s",
-        "age of information, mean": _windows(numbers["aoi_mean"], mission, 2),
-        "everyone had heard of everyone": (
-            f"never; {numbers['heard_share']:.0%} of pairs at the end"
-            if complete is None
-            else f"after {_windows(complete, mission, 0)}"
-        ),
-        "radio hops that news travelled, mean": f"{hops:.2f}" if hops else "-",
-        **_packets(numbers),
-        "packets carry": "the sender's buffer" + (f" and {payload}" * (payload != "none")),
-        "  bytes each; sent by the team": f"{numbers['packet_bytes']:,}; {bits_per_second(rate)}",
-        "who decides": CENTRE if numbers["is_centralised"] else "each robot by itself",
-        **_task_costs(mission, numbers),
-    }
+    num_windows = numbers["num_windows"]
+    rows = {f"windows of {mission.window_s:g} s flown": f"{num_windows} in {wall_s:.2f} s"}
+    rows["age of information, mean"] = _windows(numbers["aoi_mean"], mission, 2)
+
+    complete = numbers["complete_window"]
+    if complete is None:
+        told = f"never; {numbers['heard_share']:.0%} of pairs at the end"
+    else:
+        told = f"after {_windows(complete, mission, 0)}"
+    rows["everyone had heard of everyone"] = told
+
+    hops = numbers["hops_mean"]
+    rows["radio hops that news travelled, mean"] = f"{hops:.2f}" if hops else "-"
+    rows |= _packets(numbers)
+
+    carried = "the sender's buffer"
+    if numbers["payload"] != "none":
+        carried += f" and {numbers['payload']}"
+    rows["packets carry"] = carried
+    rate = bits_per_second(BITS_PER_BYTE * numbers["bytes_per_second"])
+    rows["  bytes each; sent by the team"] = f"{numbers['packet_bytes']:,}; {rate}"
+    rows["who decides"] = CENTRE if numbers["is_centralised"] else "each robot by itself"
+    rows |= _task_costs(mission, numbers)
     if mission.num_failures:
         rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"
     return rows
@@ -83,17 +94,21 @@ def _number(name: str, value: str | int | np.ndarray | None) -> str | int | floa
 
 def _windows(value: float | int, mission: Mission, digits: int) -> str:
     number = f"{value:.{digits}f}"
-    return f"{number} window{'s' * (number != '1')} ({value * mission.window_s:.2g} s)"
+    windows = "1 window" if number == "1" else f"{number} windows"
+    return f"{windows} ({value * mission.window_s:.2g} s)"
 
 
 def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:
     """Return the packets' fates: broadcasts are heard or not, addressed ones delivered or lost."""
-    sent, is_broadcast = numbers["packets_sent"], numbers["packets_attempted"] is None
+    sent = numbers["packets_sent"]
+    is_broadcast = numbers["packets_attempted"] is None
     title = "packets broadcast" if is_broadcast else "packets sent, each to one robot"
     rows = {title: f"{sent} ({sent / numbers['num_windows']:.1f} a window)"}
-    for name, count in ((name, numbers[key]) for name, key in FATES.items()):
-        if count is not None:
-            rows[name] = f"{count} ({count / sent:.0%})" if sent else f"{count}"
+    for label, name in FATES.items():
+        count = numbers[name]
+        if count is None:  # of packets of the other kind
+            continue
+        rows[label] = f"{count} ({count / sent:.0%})" if sent else f"{count}"
     if is_broadcast:
         hearers = numbers["hearers_per_packet"]
         rows["  robots that heard a packet, mean"] = "-" if hearers is None else f"{hearers:.2f}"
@@ -107,11 +122,11 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     name = numbers["task_cost_name"]
     if name not in (None, Flocking.cost_name):
         return _cost(numbers, "task_cost", name, numbers["task_cost_unit"], 2)
-    if mission.task == "stationary":
+    if not mission.moves:
         return {}
     rows = _cost(numbers, "velocity_variance", "velocity variance", "m²/s²", 4)
     left = numbers["velocity_variance_left"]
-    if mission.task == "flocking" and left is not None:
+    if mission.flocks and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
         verdict = "yes" if left < AGREED else "no"
         rows[f"  flock agreed: under {AGREED:.0%} is left"] = f"{verdict}, {share}"
@@ -119,8 +134,10 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _cost(values: Mapping[str, Any], key: str, name: str, unit: str, digits: int) -> dict[str, str]:
-    mean, first, last = (f"{values[f'{key}_{x}']:.{digits}f}" for x in ("mean", "first", "last"))
+    mean = values[f"{key}_mean"]
+    first = values[f"{key}_first"]
+    last = values[f"{key}_last"]
     return {
-        f"{name}, mean": f"{mean} {unit}",
-        "  first to last window": f"{first} to {last} {unit}",
+        f"{name}, mean": f"{mean:.{digits}f} {unit}",
+        "  first to last window": f"{first:.{digits}f} to {last:.{digits}f} {unit}",
     }

@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterator
 import numpy as np
 from jaxtyping import Int
 
-from swarm_mj.api.fly import compile_ahead
+from swarm_mj.api.flight import compile_ahead
 from swarm_mj.cli.bench_simulation import MISSION, Row
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.registry import make_policy

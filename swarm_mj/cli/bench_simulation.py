@@ -16,7 +16,7 @@ from jaxtyping import Float, Int
 from mujoco._functions import mj_step  # private: type checkers see it only there
 from mujoco._structs import MjData
 
-from swarm_mj.api.fly import compile_ahead, flight_needs
+from swarm_mj.api.flight import compile_ahead, flight_needs
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.engines import Local
 from swarm_mj.evaluation.published import BASELINES

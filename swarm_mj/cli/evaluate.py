@@ -1,13 +1,13 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
 import shlex
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from rich.console import Console
 
@@ -19,6 +19,7 @@ from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.figures import quiet_matplotlib
+from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import print_results
@@ -83,14 +84,17 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
 
 def run(options: EvaluateOptions) -> int:
     """Run the command; return its exit code."""
-    return fly(options, options.study)
+    return run_study(options, options.study)
 
 
-def fly(options: StudyFlags, study: Study) -> int:
+def run_study(options: StudyFlags, study: Study) -> int:
     """Fly a study as asked, and write its results; return the exit code."""
     need("scipy", "an evaluation")
-    kinds = ("json", "csv", "parquet")
-    outputs = [Output(f"--{kind}", getattr(options, kind), f".{kind}") for kind in kinds]
+    outputs = [
+        Output("--json", options.json, ".json"),
+        Output("--csv", options.csv, ".csv"),
+        Output("--parquet", options.parquet, ".parquet"),
+    ]
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
     if options.plot:
         need("matplotlib", "a chart")
@@ -113,22 +117,22 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     if study.pairs != list(product(study.regimes, study.policies)):
         console.print(registry.FLOWN_AS)
     header = study.header()
-    costs: dict[int, BatchCosts] = {}
-    if kept and options.resume and kept.exists():
-        costs = flying.resume_progress(kept, header)
-    elif kept:
-        flying.start_progress(kept, header)
+    costs = _begun(kept, header, is_resumed=options.resume) if kept else {}
     try:
         keep = partial(flying.append_progress, kept, header) if kept else None
         with memory_errors():
             flying.fly_study(study, costs, engine, keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
-        is_memory = isinstance(error, MemoryError)
-        ending = "Out of memory" if is_memory else "Interrupted"
+        if isinstance(error, MemoryError):
+            ending = "Out of memory"
+            code = FAILED
+        else:
+            ending = "Interrupted"
+            code = INTERRUPTED
         hint = "the same command with --resume continues" if kept else "nothing was kept"
         flown = flying.num_flown(study, costs)
         console.print(f"{ending} after {flown} of {study.num_missions} missions; {hint}.")
-        return FAILED if is_memory else INTERRUPTED
+        return code
     with deferred_interrupt():
         evaluated = study_results(study, costs, header)
         for path in options.files:
@@ -138,13 +142,25 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     results = [each.result for each in evaluated]
     print_results(results, is_wide=options.wide)
     if options.plot:
-        quiet_matplotlib()
-        from swarm_mj.api.charts import draw_evaluation  # matplotlib is slow to import
-        from swarm_mj.evaluation.figures.style import save
-
-        save(draw_evaluation(results), options.plot)
-        plain_console().print(f"Wrote {shlex.quote(str(options.plot))}")
+        _write_chart(options.plot, results)
     return DONE
+
+
+def _begun(kept: Path, header: dict[str, Any], *, is_resumed: bool) -> dict[int, BatchCosts]:
+    """Return what the progress file has of the study; begin the file unless it is resumed."""
+    if is_resumed and kept.exists():
+        return flying.resume_progress(kept, header)
+    flying.start_progress(kept, header)
+    return {}
+
+
+def _write_chart(path: Path, results: Sequence[Result]) -> None:
+    quiet_matplotlib()
+    from swarm_mj.api.charts import draw_evaluation  # matplotlib is slow to import
+    from swarm_mj.evaluation.figures.style import save
+
+    save(draw_evaluation(results), path)
+    plain_console().print(f"Wrote {shlex.quote(str(path))}")
 
 
 def _progress_file(options: StudyFlags, outputs: Iterable[Output]) -> Path | None:

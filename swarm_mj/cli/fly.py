@@ -11,7 +11,7 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.fly import flight_needs, fly_mission
+from swarm_mj.api.flight import Flight, flight_needs, fly_mission
 from swarm_mj.cli import EPILOGS
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import common_output, output_option
@@ -61,22 +61,11 @@ def run(options: FlyOptions) -> int:
     options = replace(options, policy=registry.flown_name(asked, mission))
     if path := _replay_path(options):
         need("rerun", "a replay", "fly without one: --no-record")
-    way_out = "choose fewer --robots or --windows" + (", or --no-record" if path else "")
-    needs = flight_needs(mission, options.policy, is_recorded=path is not None)
-    check_fits(needs, path, way_out, is_forced=options.yes)
+    _check_memory(options, path)
     console = Console(stderr=True, highlight=False)
-    flown = fly_mission(
-        mission,
-        registry.make_policy(options.policy, mission, **options.how),
-        options.policy,
-        options.how,
-        options.components,
-        seed=options.seed,
-        observer=options.observer,
-        is_recorded=path is not None,
-        console=console,
-        way_on=None if options.yes else "; --yes flies on all the same",
-    )
+    way_on = None if options.yes else "; --yes flies on all the same"
+    flight = _flight(options, is_recorded=path is not None)
+    flown = fly_mission(flight, console=console, way_on=way_on)
     if options.policy != asked:
         console.print(registry.FLOWN_AS)
     for note in notes_on(mission):
@@ -98,9 +87,33 @@ def run(options: FlyOptions) -> int:
     return view.run(view.view_command(path)) if options.view and path else DONE
 
 
+def _check_memory(options: FlyOptions, path: Path | None) -> None:
+    """Raise ValueError if the flight takes more than there is, unless the user insists."""
+    way_out = "choose fewer --robots or --windows"
+    if path:
+        way_out += ", or --no-record"
+    needs = flight_needs(options.mission, options.policy, is_recorded=path is not None)
+    check_fits(needs, path, way_out, is_forced=options.yes)
+
+
+def _flight(options: FlyOptions, *, is_recorded: bool) -> Flight:
+    """Return what the options fly."""
+    return Flight(
+        mission=options.mission,
+        policy=registry.make_policy(options.policy, options.mission, **options.how),
+        policy_name=options.policy,
+        **options.how,
+        components=options.components,
+        seed=options.seed,
+        observer=options.observer,
+        is_recorded=is_recorded,
+    )
+
+
 def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str, str]]:
     """Yield what to do next, and the commands that do it."""
-    name, way = this_command(), "" if view.has_display() else "--web "
+    name = this_command()
+    way = "" if view.has_display() else "--web "
     if path:
         yield "Open the replay:", f"{name} replay {way}{shlex.quote(str(path))}"
     yield "Other policies:", f"{name} policies"
@@ -111,7 +124,8 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
             registry.make_policy(other, options.mission)
             policies.append(other)
     parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.names.items()]
-    parts += [f"--features {shlex.join(options.features)}"] if options.features else []
+    if options.features:
+        parts.append(f"--features {shlex.join(options.features)}")
     named = shlex.join(dict.fromkeys(policies))
     flags = " ".join((mission_flags(options.mission), *parts))
     yield "Compare some:", f"{name} evaluate --policy {named} --episodes 5 {flags}"
@@ -127,17 +141,21 @@ def _replay_path(options: FlyOptions) -> Path | None:
     if not (is_chosen or is_installed("rerun")):
         plain_console(is_error=True).print(missing("rerun", "no replay is recorded: it"))
         options = replace(options, no_record=True)
-    path = None if options.no_record else options.record or _fresh_name(options)
-    what, way_out = ("--record", "") if options.record else ("the replay", OTHERWISE)
+    if options.no_record:
+        replay = Output("the replay", None, ".rrd")
+    elif options.record:
+        replay = Output("--record", options.record, ".rrd")
+    else:
+        replay = Output("the replay", _fresh_name(options), ".rrd", OTHERWISE)
     check_outputs(
-        Output(what, path, ".rrd", way_out),
+        replay,
         Output("--json", options.json, ".json"),
         inputs=registry.stored_policies([options.policy]),
         must_be_new=not options.force,
     )
-    if options.view and path:
-        view.view_command(path)  # complains now if there is no display
-    return path
+    if options.view and replay.path:
+        view.view_command(replay.path)  # complains now if there is no display
+    return replay.path
 
 
 def _fresh_name(options: FlyOptions) -> Path:

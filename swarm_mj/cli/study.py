@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli import EPILOGS, OPTIONS
-from swarm_mj.cli.evaluate import StudyFlags, fly
+from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import missions_of
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.mission import Mission
@@ -37,11 +37,12 @@ class StudyOptions(StudyFlags):
 
 def run(options: StudyOptions) -> int:
     """Run the command; return its exit code."""
-    action, named = options.action, options.named
+    action = options.action
+    named = options.named
     if len(named) != len(TAKES[action].split()):
         raise ValueError(f"study {action} takes {TAKES[action]}, not {' '.join(named)}")
     if action == "run":
-        return fly(options, read_study(*named))
+        return run_study(options, read_study(*named))
     if options != StudyOptions(action=action, named=named):
         raise ValueError("study compare prints what it finds; leave out the options")
     need("scipy", "a comparison")
@@ -88,9 +89,19 @@ def _study(tables: dict[str, Any]) -> Study:
 
 
 def _values(place: str, given: dict[str, Any], kind: type[Any]) -> dict[str, Any]:
-    """Return a table's values by the names of a dataclass's fields; lists are tuples."""
+    """Return a table's values by the names of a dataclass's fields; lists are tuples.
+
+    A field of several values may be given as a single text.
+    """
     check_kind(place, given, dict, "num_robots = 20")
-    known = {spec.name: get_origin(spec.type) is tuple for spec in fields(kind)}
-    check_names(place, given, known)
-    given |= {name: [given[name]] for name in given if known[name] and isinstance(given[name], str)}
-    return {name: tuple(x) if isinstance(x, list) else x for name, x in given.items()}
+    has_several = {spec.name: get_origin(spec.type) is tuple for spec in fields(kind)}
+    check_names(place, given, has_several)
+    values: dict[str, Any] = {}
+    for name, value in given.items():
+        if isinstance(value, list):
+            values[name] = tuple(value)
+        elif isinstance(value, str) and has_several[name]:
+            values[name] = (value,)
+        else:
+            values[name] = value
+    return values

@@ -85,7 +85,7 @@ def asked_settings(
     )
     for size in training.robots:
         check_whole("training", replace(mission, num_robots=size))
-    if training.reward == "velocity-variance" and mission.task != "flocking":
+    if training.reward == "velocity-variance" and not mission.flocks:
         rule = "reward velocity-variance depends on who talks only if the robots flock"
         raise ValueError(f"{rule}; add --task flocking")
     return training

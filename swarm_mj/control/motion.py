@@ -1,15 +1,20 @@
 """Controllers: their interface, and the paper's (IV-A), which stand, walk or flock.
 
+A new task is a name of `mission.specification.Task` and its controller here, which `controller_of`
+returns; the type checker finds a task without one. If the controller has a cost (`Costed`), tables,
+charts, files and rewards show it by its name and unit. Unless said otherwise, robots of a task move
+from the start (`Mission.moves`) within walls (`mission.presets.paper`).
+
 Index order: `[b, i]` is robot `i` of mission `b`.
 """
 
-from collections.abc import Callable, Sequence
-from typing import Protocol, runtime_checkable
+from collections.abc import Sequence
+from typing import Protocol, assert_never, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.mission import FlockingSet, Mission, Task
+from swarm_mj.mission import FlockingSet, Mission
 from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers
@@ -58,12 +63,20 @@ def costed(controller: Controller) -> Costed | None:
 
 def controller_of(mission: Mission) -> Controller:
     """Return the controller of a mission's task, to be started if it is `Started`."""
-    return CONTROLLERS[mission.task](mission)
+    match mission.task:
+        case "stationary":
+            return stand
+        case "random-walk":
+            return RandomWalk(mission)
+        case "flocking":
+            return Flocking(mission)
+        case unknown:
+            assert_never(unknown)  # a type error here is a task without a controller
 
 
 def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
     """Draw the initial velocities [m/s]: uniform in plus or minus V_max per axis, or 0 (IV-A)."""
-    if mission.task == "stationary":
+    if not mission.moves:
         return np.zeros((mission.num_robots, 2))
     limit = mission.max_velocity_mps
     return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
@@ -92,7 +105,8 @@ class RandomWalk:
 class Flocking:
     """Velocity consensus by `flocking` (IV-A)."""
 
-    cost_name, cost_unit = "velocity variance", "m²/s²"
+    cost_name = "velocity variance"
+    cost_unit = "m²/s²"
 
     def __init__(self, mission: Mission) -> None:
         self._flocking_set: FlockingSet = mission.flocking_set
@@ -104,13 +118,6 @@ class Flocking:
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
         """Return the velocity variance of the active robots [m²/s²]."""
         return velocity_variance(states.velocity_mps, states.is_active)
-
-
-CONTROLLERS: dict[Task, Callable[[Mission], Controller]] = {
-    "stationary": lambda _: stand,
-    "random-walk": RandomWalk,
-    "flocking": Flocking,
-}
 
 
 def flocking(
@@ -137,7 +144,8 @@ def _mean_difference(
     for b in range(num_missions):
         for i in range(num_robots):
             for axis in range(2):
-                total, num_counted = 0.0, 0
+                total = 0.0
+                num_counted = 0
                 for j in range(num_robots):
                     known = known_mps[b, i, j, axis]
                     counts = known != 0.0 if is_counted is None else is_counted[b, i, j]

@@ -16,18 +16,15 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
+from swarm_mj.protocol.mission_costs import AOI, MISSION_COSTS, TASK_COST, VELOCITY_VARIANCE
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
 
 Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
 
-# A team's reward is minus a cost, here by its name in infos. "credit" is each robot's own.
-COSTS = {
-    "aoi": "age_windows",
-    "velocity-variance": "velocity_variance_m2ps2",
-    "task-cost": "task_cost",
-}
+# A team's reward is minus a cost. "credit" is each robot's own.
+COSTS = {cost.reward: cost for cost in MISSION_COSTS}
 REWARDS = (*COSTS, "credit")
 PACKETS = ("sent", "delivered", "lost", "overheard", "answered")  # counts, in infos
 # Training and environments draw seeds from here on, so small ones are left for evaluations.
@@ -49,11 +46,15 @@ class MissionBatch:
         keeps_recipients: bool = False,
     ) -> None:
         """Take arguments as of `make_batch`; `keeps_recipients` lets checkpoints fly it again."""
-        self.mission, self.num_missions = mission, num_missions
+        self.mission = mission
+        self.num_missions = num_missions
         self.shape = (num_missions, mission.num_robots)  # B N
-        self.features, self.reward, self.with_parents = features, reward, with_parents
+        self.features = features
+        self.reward = reward
+        self.with_parents = with_parents
         self.swarm: Swarm | None = None  # made when it begins
-        self._components, self._keeps_recipients = components, keeps_recipients
+        self._components = components
+        self._keeps_recipients = keeps_recipients
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
 
@@ -87,11 +88,12 @@ class MissionBatch:
         """
         if self.reward != "credit":
             self.fly(recipient)
-            cost = self.infos()[COSTS[self.reward]]
+            cost = self.infos()[COSTS[self.reward].info]
             return np.broadcast_to(-cost[:, None], recipient.shape)
         swarm = self.flown
         # The credit replays this window, so it needs T and the channel's draws from before it.
-        before, start = swarm.buffers.timestamp.copy(), swarm.now
+        before = swarm.buffers.timestamp.copy()
+        start = swarm.now
         channel = snapshot_channel(swarm.channel)
         self.fly(recipient)
         states = swarm.states
@@ -159,12 +161,19 @@ class MissionBatch:
         Names and numbers are those of `swarm-mj fly --json`. Before the first window, when nothing
         is known and nothing was sent, ages and packets are 0.
         """
-        costs, packets = self.costs, self.costs.packets
-        infos: Info = {"seed": np.array(self.seeds)}
-        for name in ("age_windows", "velocity_variance_m2ps2", "is_complete"):
-            infos[name] = getattr(costs, name)
-        infos |= {f"packets_{name}": getattr(packets, name) for name in PACKETS}
-        return infos if costs.task_cost is None else infos | {"task_cost": costs.task_cost.value}
+        costs = self.costs
+        packets = costs.packets
+        infos: Info = {
+            "seed": np.array(self.seeds),
+            AOI.info: costs.age_windows,
+            VELOCITY_VARIANCE.info: costs.velocity_variance_m2ps2,
+            "is_complete": costs.is_complete,
+        }
+        for name in PACKETS:
+            infos[f"packets_{name}"] = getattr(packets, name)
+        if costs.task_cost is not None:
+            infos[TASK_COST.info] = costs.task_cost.value
+        return infos
 
     def first(self) -> tuple[Observation, Info]:
         """Return the first mission's view and infos, for environments of a single mission."""
@@ -174,7 +183,9 @@ class MissionBatch:
 
 def seeds_from(first: int | None, number: int) -> list[int | None]:
     """Return seeds that count on from the first, kept as it is; None: missions are drawn."""
-    return [first, *(None if first is None else first + n for n in range(1, number))]
+    if first is None:
+        return [None] * number
+    return [first, *(first + n for n in range(1, number))]
 
 
 def seed_or_next(seed: int | None, rng: np.random.Generator) -> int:

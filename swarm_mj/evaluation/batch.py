@@ -85,8 +85,9 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)
     missing = np.full(shape[0], np.nan)
-    complete = task_cost = missing
-    sums = dict[str, np.ndarray]()
+    complete = missing
+    task_cost = missing
+    sums: dict[str, np.ndarray] = {}
     ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
     for window in flown:
         costs, states, now = window.costs, swarm.states, swarm.now
@@ -105,15 +106,20 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
             "task_cost": task_cost,
         }
         packets = costs.packets
-        measured |= {f"packets_{name}": getattr(packets, name) for name in TOTALS}
+        for name in TOTALS:
+            measured[f"packets_{name}"] = getattr(packets, name)
         for name, values in measured.items():
             sums[name] = sums.get(name, 0.0) + values
         complete = np.fmin(complete, np.where(costs.is_complete, now, np.nan))
         count_ages(swarm.buffers.timestamp, now, ages, is_on)
     found = {"task_cost_last": task_cost, "complete_window": complete}
     for name, total in sums.items():
-        windows = num_steady if name == "aoi_steady" else num_windows
-        found[name] = total if name.startswith("packets_") else total / windows
+        if name.startswith("packets_"):
+            found[name] = total
+        elif name == "aoi_steady":
+            found[name] = total / num_steady
+        else:
+            found[name] = total / num_windows
     # A controller's cost may be infinite, which has no mean over missions.
     finite = {name: np.where(np.isfinite(each), each, np.nan) for name, each in found.items()}
     return BatchCosts(**finite, ages=ages)
@@ -155,7 +161,8 @@ def connectivity_floor(
     and count.
     """
     num_missions, num_robots = position_m.shape[:2]
-    age, newest = np.empty(num_missions), np.empty(num_robots)
+    age = np.empty(num_missions)
+    newest = np.empty(num_robots)
     is_met = np.empty(num_robots, dtype=np.bool_)
     part = np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):

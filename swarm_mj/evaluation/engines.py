@@ -38,7 +38,8 @@ SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 GROUP: dict[str, Any] = {"group": "processes that fly missions"}
-MAX_ARRAY, ATTEMPTS = 1000, 3  # SLURM's usual limit of jobs in an array; how often one is submitted
+MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
+ATTEMPTS = 3  # how often a job is submitted
 
 
 @runtime_checkable
@@ -98,8 +99,9 @@ class Ray:
         """Do all pieces, as `Engine.run` says."""
         os.environ.update(QUIET)
         ray: Any = import_module("ray")
-        here = {"address": "local", "num_cpus": self.num_jobs}
-        how: dict[str, Any] = {"address": self.address} if self.address else here
+        how: dict[str, Any] = {"address": "local", "num_cpus": self.num_jobs}
+        if self.address:
+            how = {"address": self.address}
         try:
             # Its end puts back the handlers of signals that Ray replaces.
             with deferred_interrupt() as is_interrupted, TemporaryDirectory() as parts:
@@ -108,7 +110,9 @@ class Ray:
                 ray.init(**how, logging_level="ERROR", log_to_driver=False)
             if is_interrupted():
                 raise KeyboardInterrupt
-            do, code, left = ray.remote(max_retries=-1)(_do), code_digest(), enumerate(pieces)
+            do = ray.remote(max_retries=-1)(_do)
+            code = code_digest()
+            left = enumerate(pieces)
             tasks = []
             while True:
                 # Never a million tasks at once, and as many CPUs as there are by now.
@@ -138,11 +142,16 @@ class Slurm:
         folder = mkdtemp(prefix="slurm-", dir=Path.cwd())  # which all machines see
         executor = submitit.AutoExecutor(folder, cluster=self.cluster)
         setup = [f"export {name}={value}" for name, value in SURROUNDINGS.items()]
-        most = {"slurm_array_parallelism": self.num_jobs, "timeout_min": 24 * 60}
-        executor.update_parameters(**most, slurm_setup=setup)
+        executor.update_parameters(
+            slurm_array_parallelism=self.num_jobs,
+            timeout_min=24 * 60,
+            slurm_setup=setup,
+        )
         left = dict(enumerate(pieces))
         for _ in range(ATTEMPTS):
-            shares = [list(left.items())[k::MAX_ARRAY] for k in range(min(len(left), MAX_ARRAY))]
+            # Each job of the array does every MAX_ARRAY-th piece.
+            num_shares = min(len(left), MAX_ARRAY)
+            shares = [list(left.items())[k::MAX_ARRAY] for k in range(num_shares)]
             try:
                 jobs = executor.map_array(partial(_do, work, code_digest()), shares)
             except RuntimeError as error:

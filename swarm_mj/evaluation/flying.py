@@ -44,7 +44,9 @@ def fly_study(
     Raises KeyboardInterrupt by Ctrl-C; `costs` then has all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
-    flown = (engine if left else Local()).run(fly_batch, [study.batches[index] for index in left])
+    # With nothing left, no cluster is started.
+    starts = engine if left else Local()
+    flown = starts.run(fly_batch, [study.batches[index] for index in left])
     done = num_flown(study, costs)
     bar = WorkBar("Flying", study.num_missions, "missions", completed=done, console=console)
     with bar, closing(flown):
@@ -66,13 +68,14 @@ def progress_path(output: Path) -> Path:
 
 def start_progress(path: Path, header: dict[str, Any]) -> None:
     """Begin a progress file, in place of any other; raise OSError if that cannot be."""
-    write_bytes(path, _line(b"", msgspec.json.encode(header)))
+    write_bytes(path, _first_line(msgspec.json.encode(header)))
 
 
 def append_progress(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
     """Add what a batch cost, by its index among the study's; raise OSError if that cannot be."""
     lists = {name: numbers.tolist() for name, numbers in vars(costs).items()}
-    append_bytes(path, _line(msgspec.json.encode(header), msgspec.json.encode([index, lists])))
+    text = msgspec.json.encode([index, lists])
+    append_bytes(path, _later_line(msgspec.json.encode(header), text))
 
 
 def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
@@ -84,18 +87,20 @@ def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]
     """
     content = read_file(path, "progress", MAX_BYTES)
     whole, _, cut_off = content.rpartition(b"\n")
-    if not whole and _line(b"", msgspec.json.encode(header)).startswith(cut_off):
+    if not whole and _first_line(msgspec.json.encode(header)).startswith(cut_off):
         start_progress(path, header)
         return {}
-    lines = [line.partition(b" ")[2] for line in whole.split(b"\n")]
-    digested = [_line(b"" if line is lines[0] else lines[0], line) for line in lines]
-    if b"".join(digested) != whole + b"\n":
+    # Each line's JSON, without its digest: the header's, and one for each batch flown.
+    first, *rows = [line.partition(b" ")[2] for line in whole.split(b"\n")]
+    expected = _first_line(first)
+    expected += b"".join(_later_line(first, row) for row in rows)
+    if expected != whole + b"\n":
         raise ValueError(
             f"progress {path} is damaged, or of another version; start over with --force instead "
             "of --resume"
         )
-    before, *flown = map(msgspec.json.decode, lines)
-    if difference := next(_differences("", before, header), ""):
+    difference = next(_differences("", msgspec.json.decode(first), header), "")
+    if difference:
         raise ValueError(
             f"progress {path} is of another evaluation: {difference}; repeat that one, or start "
             "over with --force instead of --resume"
@@ -103,16 +108,33 @@ def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]
     if cut_off:
         write_bytes(path, whole + b"\n")
     # The digests have shown that this very code wrote the lines.
-    kinds = {"ages": np.int64}  # the others are floats, and null is nan
-    return {
-        index: BatchCosts(**{n: np.array(each, kinds.get(n, float)) for n, each in lists.items()})
-        for index, lists in flown
-    }
+    flown: dict[int, BatchCosts] = {}
+    for row in rows:
+        index, lists = msgspec.json.decode(row)
+        flown[index] = _batch_costs(lists)
+    return flown
 
 
-def _line(first: bytes, text: bytes) -> bytes:
-    """Return a line of JSON with its digest; `first` is the JSON of the file's first line."""
-    return b"%b %b\n" % (hashlib.sha256(first + text).hexdigest()[:16].encode(), text)
+def _batch_costs(lists: dict[str, list[float | None]]) -> BatchCosts:
+    """Return costs from JSON's lists; `null` is nan. All are floats but for counts of ages."""
+    arrays: dict[str, np.ndarray] = {}
+    for name, values in lists.items():
+        arrays[name] = np.array(values, np.int64 if name == "ages" else np.float64)
+    return BatchCosts(**arrays)
+
+
+def _first_line(text: bytes) -> bytes:
+    """Return a file's first line: the digest of its JSON, and the JSON."""
+    return b"%b %b\n" % (_digest(text), text)
+
+
+def _later_line(first: bytes, text: bytes) -> bytes:
+    """Return another line, whose digest is of the first line's JSON as well."""
+    return b"%b %b\n" % (_digest(first + text), text)
+
+
+def _digest(text: bytes) -> bytes:
+    return hashlib.sha256(text).hexdigest()[:16].encode()
 
 
 def _differences(name: str, before: object, now: object) -> Iterator[str]:

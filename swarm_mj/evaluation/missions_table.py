@@ -1,6 +1,7 @@
 """Missions as rows of a Parquet file; the missions of two files, compared one by one."""
 
 import json
+import math
 from collections.abc import Sequence
 from dataclasses import fields
 from pathlib import Path
@@ -11,9 +12,10 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
-from swarm_mj.evaluation.results import config_of
-from swarm_mj.evaluation.summary import COSTS, Evaluated, bootstrap_interval
+from swarm_mj.evaluation.results import Evaluated, config_of
+from swarm_mj.evaluation.samples import bootstrap_interval
 from swarm_mj.mission import Mission
+from swarm_mj.protocol.mission_costs import MISSION_COSTS
 from swarm_mj.simulation.components import CALLED_WITH
 from swarm_mj.system.fields import kind_of
 from swarm_mj.system.reading import open_file
@@ -22,24 +24,26 @@ from swarm_mj.system.writing import write_bytes
 KINDS = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 REGIME = {spec.name: kind_of(spec) for spec in fields(Mission)} | dict.fromkeys(CALLED_WITH, str)
 STUDY = ("version", "commit", "episodes", "seed", "baseline")  # with all policies and regimes
+COSTS = [cost.column for cost in MISSION_COSTS]
 COLUMNS = {"policy": str, "seed": int} | dict.fromkeys(COSTS, float) | REGIME
 
 
 def write_missions(path: Path, evaluated: Sequence[Evaluated]) -> None:
     """Write a row for each mission, and into the metadata the study, as JSON."""
     columns = [(name, KINDS[kind]) for name, kind in COLUMNS.items()]
-    configs = [config_of(each.result) for each in evaluated]
     study: dict[str, Any] = {name: getattr(evaluated[0].result, name) for name in STUDY}
-    study["policies and regimes"] = configs
-    rows = [
-        config
-        | {"policy": each.result.policy, "seed": each.result.seed + index}
-        | {cost: values[index] for cost in COSTS if (values := getattr(each, cost))}
-        for config, each in zip(configs, evaluated, strict=True)
-        for index in range(len(each.aoi))
-    ]
+    study["policies and regimes"] = [config_of(each.result) for each in evaluated]
+    rows: list[dict[str, Any]] = []
+    for each in evaluated:
+        regime = config_of(each.result) | {"policy": each.result.policy}
+        for index in range(len(each.aoi)):
+            row = regime | {"seed": each.result.seed + index}
+            for name, costs in each.costs.items():
+                row[name] = costs[index]
+            rows.append(row)
     table = pa.Table.from_pylist(rows, pa.schema(columns, {"study": json.dumps(study)}))
-    parquet.write_table(table, content := pa.BufferOutputStream())
+    content = pa.BufferOutputStream()
+    parquet.write_table(table, content)
     write_bytes(path, memoryview(content.getvalue()))
 
 
@@ -65,16 +69,23 @@ def compared(before: pd.DataFrame, after: pd.DataFrame, cost: str) -> pd.DataFra
     for name in REGIME:  # those that tell regimes apart
         if len(both[[*varied, name]].drop_duplicates()) > len(both[varied].drop_duplicates()):
             varied.insert(-1, name)
-    rows = []
+    rows: list[dict[str, Any]] = []
     for _, missions in both.groupby(varied, dropna=False):
         found = np.array(missions["_merge"])
-        shown = missions[found == "both"] if "both" in found else missions
-        old, new = (np.array(shown[f"{cost}_{side}"], float) for side in "xy")
+        is_in_both = found == "both"
+        shown = missions[is_in_both] if is_in_both.any() else missions
+        old = np.array(shown[f"{cost}_x"], float)
+        new = np.array(shown[f"{cost}_y"], float)
         difference = new - old
         ends = bootstrap_interval(difference[~np.isnan(difference)])
-        means = {"before": old.mean(), "after": new.mean(), "difference": difference.mean()}
-        means |= dict(zip(("low", "high"), np.array(ends, float), strict=True))
-        sides = {"missions": "both", "only before": "left_only", "only after": "right_only"}
-        counts = {said: (found == side).sum() for said, side in sides.items()}
-        rows.append({name: missions[name].iloc[0] for name in varied} | means | counts)
+        row = {name: missions[name].iloc[0] for name in varied}
+        row["before"] = old.mean()
+        row["after"] = new.mean()
+        row["difference"] = difference.mean()
+        row["low"] = math.nan if ends.low is None else ends.low
+        row["high"] = math.nan if ends.high is None else ends.high
+        row["missions"] = is_in_both.sum()
+        row["only before"] = (found == "left_only").sum()
+        row["only after"] = (found == "right_only").sum()
+        rows.append(row)
     return pd.DataFrame(rows)

@@ -1,16 +1,29 @@
-"""Results of evaluations as files: one row per policy and regime, as CSV or JSON."""
+"""Results of evaluations: their columns, what tables show of them, and files of them.
 
-from collections.abc import Iterable
-from dataclasses import asdict, dataclass, fields
+A new column is a field of `Result`, and an entry of `WIDE` or `BRIEF` if tables should show it.
+"""
+
+import math
+from collections.abc import Callable, Iterable
+from dataclasses import Field, asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
 import msgspec
+import numpy as np
 
-from swarm_mj.mission.specification import NOTHING
+from swarm_mj.control.motion import Flocking
+from swarm_mj.evaluation.measured import HOW, Measured, column, later_column
+from swarm_mj.mission.specification import NOTHING, OPEN
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE
+from swarm_mj.radio.words import radio_in_words
 from swarm_mj.system.fields import FORMER_NAMES
 from swarm_mj.system.reading import read_json, read_rows
 from swarm_mj.system.writing import write_csv
+
+NONE = "-"  # a cell of what does not exist
+CARRIES_MORE = "carry more than T, M, P"  # said wherever such policies are shown
+MAX_BYTES = 100_000_000  # of a file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,99 +33,198 @@ class Result:
     Age of information (AoI, Eq. 10) and ages are in windows, velocity variance (Eq. 17) in m²/s².
     `_std` is the sample's standard deviation, `_sem` the mean's standard error, `_ci_` the mean's
     bootstrap interval of 95 %; all are over missions unless a comment says otherwise.
+
+    Each field is a column, in the files' order, with the way it is computed from what was measured.
     """
 
-    policy: str
-    task: str
-    preset: str
-    num_robots: int
-    range_ratio: float
-    velocity_ratio: float
-    boundary: str
-    physics: str
-    num_windows: int
-    failure_fraction: float = 0.0  # of the robots, half-way; files made before it have none
-    episodes: int
-    seed: int  # of the first mission; the others follow one by one
-    probability: float | None  # of a transmission, for the policies that have one
-    arena: str = "open"  # what stands in the area
-    radio: str | None = None  # what the channel has beyond free space; None is nothing
-    prior_knowledge: str = NOTHING  # what robots knew before the mission
-    channel: str | None = None  # the user's own, as module:Name; None is the mission's
-    controller: str | None = None  # as above
-    scene: str | None = None  # as above
-    bit_rate: float | None = None  # of the radio [bit/s]; None: packets of any size fit
-    payload: str | None = None  # what packets carry beyond T, M and P (II-B); "none" or its name
+    policy: str = column(lambda own: own.policy)
+    task: str = column(lambda own: own.mission.task)
+    preset: str = column(lambda own: own.mission.preset)
+    num_robots: int = column(lambda own: own.mission.num_robots)
+    range_ratio: float = column(lambda own: own.mission.range_ratio)
+    velocity_ratio: float = column(lambda own: own.mission.velocity_ratio)
+    boundary: str = column(lambda own: own.mission.boundary)
+    physics: str = column(lambda own: own.mission.physics)
+    num_windows: int = column(lambda own: own.mission.num_windows)
+    # Of the robots, half-way.
+    failure_fraction: float = later_column(lambda own: own.mission.failure_fraction, older=0.0)
+    episodes: int = column(lambda own: own.study.episodes)
+    # Of the first mission; the others follow one by one.
+    seed: int = column(lambda own: own.study.seed)
+    # Of a transmission, for the policies that have one.
+    probability: float | None = column(lambda own: own.probability)
+    # What stands in the area.
+    arena: str = later_column(lambda own: own.mission.arena, older=OPEN)
+    # What the channel has beyond free space; None is nothing.
+    radio: str | None = later_column(lambda own: radio_in_words(own.mission) or None, older=None)
+    # What robots knew before the mission.
+    prior_knowledge: str = later_column(lambda own: own.mission.prior_knowledge, older=NOTHING)
+    # The user's own, as module:Name; None is the mission's.
+    channel: str | None = later_column(lambda own: own.component("channel"), older=None)
+    controller: str | None = later_column(lambda own: own.component("controller"), older=None)
+    scene: str | None = later_column(lambda own: own.component("scene"), older=None)
+    # Of the radio [bit/s]; None: packets of any size fit.
+    bit_rate: float | None = later_column(lambda own: own.mission.bit_rate, older=None)
+    # What packets carry beyond T, M and P (II-B): its name, or "none".
+    payload: str | None = later_column(lambda own: own.made.payload, older=None)
 
-    aoi_mean: float
-    aoi_std: float | None
-    aoi_sem: float | None
-    aoi_ci_low: float | None
-    aoi_ci_high: float | None
-    aoi_median: float
-    aoi_p95: float
-    aoi_worst: float
-    aoi_steady_mean: float  # second half of the mission
-    aoi_steady_sem: float | None
-    age_p95: float  # over all ordered pairs of two robots and all windows of all missions
-    age_worst: float  # as above
+    aoi_mean: float = column(lambda own: own.aoi.mean)
+    aoi_std: float | None = column(lambda own: own.aoi.std)
+    aoi_sem: float | None = column(lambda own: own.aoi.sem)
+    aoi_ci_low: float | None = column(lambda own: own.aoi.interval.low)
+    aoi_ci_high: float | None = column(lambda own: own.aoi.interval.high)
+    aoi_median: float = column(lambda own: own.aoi.median)
+    aoi_p95: float = column(lambda own: own.aoi.p95)
+    aoi_worst: float = column(lambda own: own.aoi.worst)
+    # Over the second half of the mission.
+    aoi_steady_mean: float = column(lambda own: own.aoi_steady.mean)
+    aoi_steady_sem: float | None = column(lambda own: own.aoi_steady.sem)
+    # Over all ordered pairs of two robots and all windows of all missions.
+    age_p95: float = column(lambda own: own.age_quantile(0.95))
+    age_worst: float = column(lambda own: own.age_quantile(1.0))
     # What instant sharing within connected parts would leave; None over a custom channel.
-    aoi_floor_mean: float | None
-    aoi_floor_sem: float | None
+    aoi_floor_mean: float | None = column(lambda own: own.aoi_floor.mean)
+    aoi_floor_sem: float | None = column(lambda own: own.aoi_floor.sem)
 
-    velocity_variance_mean: float
-    velocity_variance_std: float | None
-    velocity_variance_sem: float | None
-    velocity_variance_ci_low: float | None
-    velocity_variance_ci_high: float | None
-    velocity_variance_median: float
+    velocity_variance_mean: float = column(lambda own: own.velocity_variance.mean)
+    velocity_variance_std: float | None = column(lambda own: own.velocity_variance.std)
+    velocity_variance_sem: float | None = column(lambda own: own.velocity_variance.sem)
+    velocity_variance_ci_low: float | None = column(lambda own: own.velocity_variance.interval.low)
+    velocity_variance_ci_high: float | None = column(
+        lambda own: own.velocity_variance.interval.high
+    )
+    velocity_variance_median: float = column(lambda own: own.velocity_variance.median)
 
-    # What the task costs, as its controller calls it; none of the older files has these.
-    task_cost_name: str | None = None
-    task_cost_unit: str | None = None
-    task_cost_mean: float | None = None
-    task_cost_sem: float | None = None
-    task_cost_last_mean: float | None = None  # after the last window
-    task_cost_last_sem: float | None = None
+    # What the task costs, as its controller calls it.
+    task_cost_name: str | None = later_column(lambda own: own.task_cost_name, older=None)
+    task_cost_unit: str | None = later_column(lambda own: own.task_cost_unit, older=None)
+    task_cost_mean: float | None = later_column(lambda own: own.task_cost.mean, older=None)
+    task_cost_sem: float | None = later_column(lambda own: own.task_cost.sem, older=None)
+    # After the last window.
+    task_cost_last_mean: float | None = later_column(
+        lambda own: own.task_cost_last.mean, older=None
+    )
+    task_cost_last_sem: float | None = later_column(lambda own: own.task_cost_last.sem, older=None)
 
-    packets_per_window: float  # requests or broadcasts, no responses
-    packet_bytes: int | None = None  # of a packet; none of the older files has it
-    bytes_per_second: float | None = None  # sent by the team, responses too
-    delivery_ratio: float | None  # of requests: decoded by their addressee
-    heard_ratio: float | None = None  # of broadcasts: decoded by at least one robot
-    hearers_per_packet: float | None = None  # robots that decoded a broadcast, on average
-    hops_mean: float  # depth of the parent trees, over windows and missions
-    complete_window_median: float | None  # over all missions; None if half never were
-    complete_share: float  # of missions in which everyone heard of everyone
+    # Requests or broadcasts, no responses.
+    packets_per_window: float = column(lambda own: own.num_sent / own.num_windows)
+    packet_bytes: int | None = later_column(lambda own: own.packet_bytes, older=None)  # of each
+    # Sent by the team, responses too.
+    bytes_per_second: float | None = later_column(lambda own: own.bytes_per_second, older=None)
+    # Of requests: decoded by their addressee.
+    delivery_ratio: float | None = column(lambda own: own.per_packet(own.costs.packets_delivered))
+    # Of broadcasts: decoded by at least one robot.
+    heard_ratio: float | None = later_column(
+        lambda own: own.per_packet(own.costs.packets_heard), older=None
+    )
+    # Robots that decoded a broadcast, on average.
+    hearers_per_packet: float | None = later_column(
+        lambda own: own.per_packet(own.costs.packets_receptions), older=None
+    )
+    # Depth of the parent trees, over windows and missions.
+    hops_mean: float = column(lambda own: float(np.mean(own.costs.hops)))
+    # Over all missions; None if half never were.
+    complete_window_median: float | None = column(lambda own: float(np.median(own.complete)))
+    # Of missions in which everyone heard of everyone.
+    complete_share: float = column(lambda own: float(np.mean(np.isfinite(own.complete))))
 
-    baseline: str  # differences are this policy's minus the baseline's, on the same missions
-    aoi_difference_mean: float | None
-    aoi_difference_ci_low: float | None
-    aoi_difference_ci_high: float | None
-    velocity_variance_difference_mean: float | None
-    velocity_variance_difference_ci_low: float | None
-    velocity_variance_difference_ci_high: float | None
+    # Differences are this policy's minus the baseline's, on the same missions.
+    baseline: str = column(lambda own: own.baseline)
+    aoi_difference_mean: float | None = column(lambda own: own.aoi_difference.mean)
+    aoi_difference_ci_low: float | None = column(lambda own: own.aoi_difference.interval.low)
+    aoi_difference_ci_high: float | None = column(lambda own: own.aoi_difference.interval.high)
+    velocity_variance_difference_mean: float | None = column(
+        lambda own: own.velocity_variance_difference.mean
+    )
+    velocity_variance_difference_ci_low: float | None = column(
+        lambda own: own.velocity_variance_difference.interval.low
+    )
+    velocity_variance_difference_ci_high: float | None = column(
+        lambda own: own.velocity_variance_difference.interval.high
+    )
 
-    task_cost_difference_mean: float | None = None
-    task_cost_difference_ci_low: float | None = None
-    task_cost_difference_ci_high: float | None = None
+    task_cost_difference_mean: float | None = later_column(
+        lambda own: own.task_cost_difference.mean, older=None
+    )
+    task_cost_difference_ci_low: float | None = later_column(
+        lambda own: own.task_cost_difference.interval.low, older=None
+    )
+    task_cost_difference_ci_high: float | None = later_column(
+        lambda own: own.task_cost_difference.interval.high, older=None
+    )
 
-    published_aoi_mean: float | None  # the paper's value where the regime is one of its own
-    published_aoi_sem: float | None
-    published_velocity_variance_mean: float | None
-    published_velocity_variance_sem: float | None
+    # The paper's value where the regime is one of its own.
+    published_aoi_mean: float | None = column(lambda own: own.published_mean(AOI))
+    published_aoi_sem: float | None = column(lambda own: own.published_sem(AOI))
+    published_velocity_variance_mean: float | None = column(
+        lambda own: own.published_mean(VELOCITY_VARIANCE)
+    )
+    published_velocity_variance_sem: float | None = column(
+        lambda own: own.published_sem(VELOCITY_VARIANCE)
+    )
 
-    version: str
-    commit: str | None
-    config: str  # JSON: every field of the mission, the policy and its parameters
+    version: str = column(lambda own: own.version)
+    commit: str | None = column(lambda own: own.commit)
+    # JSON: every field of the mission, the policy and its parameters.
+    config: str = column(lambda own: own.config)
 
 
-CARRIES_MORE = "carry more than T, M, P"  # said wherever such policies are shown
+def computation(spec: Field[Any]) -> Callable[[Measured], object]:
+    """Return how a column is computed; raise TypeError for one that nothing computes."""
+    if HOW not in spec.metadata:
+        raise TypeError(
+            f"nothing computes the column {spec.name} of Result; declare it by "
+            "`column(lambda own: ...)`, or by `later_column` if older files lack it"
+        )
+    return spec.metadata[HOW]
+
+
+# Made on import, so that a column which nothing computes is found at once.
+COMPUTATIONS = {spec.name: computation(spec) for spec in fields(Result)}
+COLUMNS = tuple(COMPUTATIONS)
+
+
+def result_of(measured: Measured) -> Result:
+    """Return all columns of what was measured."""
+    cells: dict[str, Any] = {name: compute(measured) for name, compute in COMPUTATIONS.items()}
+    for name, value in cells.items():
+        if isinstance(value, float) and not math.isfinite(value):
+            cells[name] = None  # what does not exist, or never happened
+    return Result(**cells)
+
+
+@dataclass(frozen=True, kw_only=True)
+class Evaluated:
+    """A result and its missions, in the order of their seeds."""
+
+    result: Result
+    aoi: list[float]  # Eq. 10, mean over windows [windows]
+    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
+    task_cost: list[float] | None  # mean over windows; None if the controller has none
+
+    @property
+    def costs(self) -> dict[str, list[float]]:
+        """Each mission's costs by their names, `MISSION_COSTS`; those that the task has."""
+        costs = {AOI.column: self.aoi, VELOCITY_VARIANCE.column: self.velocity_variance}
+        if self.task_cost is not None:
+            costs[TASK_COST.column] = self.task_cost
+        return costs
+
+    @property
+    def row(self) -> dict[str, Any]:
+        """The result's columns, and the missions' costs as lists."""
+        missions = {f"episode_{name}": each for name, each in self.costs.items()}
+        return asdict(self.result) | missions
 
 
 def carries_more(result: Result) -> bool:
     """Return whether packets carry more than T, M and P (II-B); older files do not say."""
     return result.payload not in (None, "none")
+
+
+def has_own_cost(result: Result) -> bool:
+    """Return whether the task has a cost of its own, and not a flock's velocity variance."""
+    return result.task_cost_name not in (None, Flocking.cost_name)
 
 
 def config_of(result: Result) -> dict[str, Any]:
@@ -125,15 +237,216 @@ def config_of(result: Result) -> dict[str, Any]:
         ) from error
 
 
-COLUMNS = tuple(spec.name for spec in fields(Result))
-MAX_BYTES = 100_000_000  # of a file
+# What tables show.
+
+Text = str | Callable[[Result], str]  # the same of every result, or not
+
+
+@dataclass(frozen=True, kw_only=True)
+class Shown:
+    """A column of printed tables. Headings and cells have up to two lines.
+
+    `meaning` is a sentence below the tables, or more of them; empty where none is needed. It is of
+    the first result if every table has the column. If `applies` tells which do, it may differ from
+    result to result, and comes after the others.
+    """
+
+    heading: Text
+    cell: Callable[[Result], str]
+    meaning: Text
+    applies: Callable[[Result], bool] | None = None  # None: to every result
+
+
+def said(text: Text, result: Result) -> str:
+    """Return a text, as it is of a result."""
+    return text if isinstance(text, str) else text(result)
+
+
+def number(value: float | None, form: str = ".2f") -> str:
+    """Return a cell's number."""
+    return NONE if value is None else format(value, form)
+
+
+def plus_minus(mean: float | None, sem: float | None) -> str:
+    """Return a mean and its standard error, if there is one."""
+    return number(mean) if sem is None else f"{number(mean)} ± {sem:.2f}"
+
+
+def interval(low: float | None, high: float | None) -> str:
+    """Return both ends, or nothing where there is no interval."""
+    return "" if low is None or high is None else f"{low:.2f}, {high:.2f}"
+
+
+def _reached(result: Result) -> str:
+    """Return the share of requests that reached their addressee, of broadcasts anybody."""
+    reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
+    return number(reached, ".0%")
+
+
+def _difference(result: Result) -> str:
+    ends = interval(result.aoi_difference_ci_low, result.aoi_difference_ci_high)
+    return f"{number(result.aoi_difference_mean)}\n{ends}"
+
+
+def _difference_in_a_line(result: Result) -> str:
+    ends = interval(result.aoi_difference_ci_low, result.aoi_difference_ci_high)
+    mean = number(result.aoi_difference_mean)
+    return f"{mean} [{ends}]" if ends else mean
+
+
+def _task_cost(result: Result) -> str:
+    return plus_minus(result.task_cost_mean, result.task_cost_sem)
+
+
+def _task_cost_at_the_end(result: Result) -> str:
+    return plus_minus(result.task_cost_last_mean, result.task_cost_last_sem)
+
+
+def _task_cost_difference(result: Result) -> str:
+    ends = interval(result.task_cost_difference_ci_low, result.task_cost_difference_ci_high)
+    return f"{number(result.task_cost_difference_mean)}\n{ends}"
+
+
+def _task_cost_meaning(result: Result) -> str:
+    if not has_own_cost(result):
+        return ""
+    cost = f"{result.task_cost_name} [{result.task_cost_unit}]"
+    return f"Task cost: {cost}, mean over windows ± standard error over missions."
+
+
+def is_flock(result: Result) -> bool:
+    """Return whether the robots were to agree on one velocity."""
+    return result.task == "flocking"
+
+
+def _shows_variance(result: Result) -> bool:
+    return is_flock(result) and not has_own_cost(result)
+
+
+def _variance_meaning(result: Result) -> str:
+    if not is_flock(result):
+        return ""
+    return "Velocity variance (var.): of the robots' velocities [m²/s²]."
+
+
+def _published(result: Result) -> str:
+    age = plus_minus(result.published_aoi_mean, result.published_aoi_sem)
+    variance = result.published_velocity_variance_mean
+    if variance is None or not is_flock(result):
+        return age
+    return f"{age}\n{variance:.4f}"
+
+
+def _published_meaning(result: Result) -> str:
+    return "" if result.published_aoi_mean is None else "Published: by the paper."
+
+
+AGE_MEANING = (
+    "AoI: age of information, how old a robot's news of another is [windows]; mean over the "
+    "missions,"
+)
+
+# What most people read, in one line.
+BRIEF = (
+    Shown(
+        heading="AoI ± SEM",
+        cell=lambda result: plus_minus(result.aoi_mean, result.aoi_sem),
+        meaning=f"{AGE_MEANING} with its standard error.",
+    ),
+    Shown(
+        heading=lambda result: f"minus {result.baseline}'s [95 %]",
+        cell=_difference_in_a_line,
+        meaning="Differences are mission by mission, with 95 % intervals.",
+    ),
+    Shown(
+        heading="task cost ± SEM",
+        cell=_task_cost,
+        meaning=_task_cost_meaning,
+        applies=has_own_cost,
+    ),
+    Shown(
+        heading="heard",
+        cell=_reached,
+        meaning=(
+            "Heard: packets that reached their addressee or, of broadcasts, at least one robot."
+        ),
+    ),
+)
+
+# What `--wide` shows.
+WIDE = (
+    Shown(
+        heading="AoI ± SEM\n95 %",
+        cell=lambda result: (
+            f"{plus_minus(result.aoi_mean, result.aoi_sem)}\n"
+            f"{interval(result.aoi_ci_low, result.aoi_ci_high)}"
+        ),
+        meaning=f"{AGE_MEANING} standard error and 95 % interval.",
+    ),
+    Shown(
+        heading="median\np95",
+        cell=lambda result: f"{result.aoi_median:.2f}\n{result.aoi_p95:.2f}",
+        meaning="Median and p95 are over missions.",
+    ),
+    Shown(
+        heading="difference\n95 %",
+        cell=_difference,
+        meaning=lambda result: (
+            f"Difference: AoI minus that of {result.baseline}, mission by mission."
+        ),
+    ),
+    Shown(
+        heading="packets\nreached",
+        cell=lambda result: f"{result.packets_per_window:.2f}\n{_reached(result)}",
+        meaning=(
+            "Packets: sent in a window, and the share that reached its addressee or, of "
+            "broadcasts, at least one robot;"
+        ),
+    ),
+    Shown(
+        heading="hearers\nbytes",
+        cell=lambda result: (
+            f"{number(result.hearers_per_packet)}\n{number(result.packet_bytes, ',d')}"
+        ),
+        meaning=("hearers: robots that decoded a broadcast, on average. Bytes: of a packet."),
+    ),
+    Shown(
+        heading="task cost\nat the end",
+        cell=lambda result: f"{_task_cost(result)}\n{_task_cost_at_the_end(result)}",
+        meaning=_task_cost_meaning,
+        applies=has_own_cost,
+    ),
+    Shown(
+        heading="difference\nof task cost",
+        cell=_task_cost_difference,
+        meaning="",
+        applies=has_own_cost,
+    ),
+    Shown(
+        heading="velocity\nvariance",
+        cell=lambda result: f"{result.velocity_variance_mean:.4f}",
+        meaning=_variance_meaning,
+        applies=_shows_variance,
+    ),
+    Shown(
+        heading=lambda result: "published\nAoI, var." if is_flock(result) else "published\nAoI",
+        cell=_published,
+        meaning=_published_meaning,
+        applies=lambda result: not has_own_cost(result),
+    ),
+)
+
+
+# Files.
 
 
 def read_results(path: Path) -> list[Result]:
     """Return the rows of a file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
 
-    Columns that no result has are ignored, and those with a default may be missing. Raises
-    ValueError if the file cannot be read as such, or has no rows.
+    Columns that no result has are ignored, and those that are newer than the file may be missing.
+
+    Raises:
+        ValueError: The file cannot be read as such, or has no rows.
     """
     try:
         rows = read_rows(path, "results file", MAX_BYTES)

@@ -3,7 +3,6 @@
 import json
 from dataclasses import asdict, dataclass
 from functools import cached_property
-from itertools import product
 from typing import Any
 
 from swarm_mj.control.motion import Costed, controller_of
@@ -77,9 +76,11 @@ class Study:
     @property
     def pairs(self) -> list[tuple[Mission, str]]:
         """Every regime with every policy, regime by regime."""
-        pairs = product(self.regimes, self.policies)
-        flown = ((regime, registry.flown_name(name, regime)) for regime, name in pairs)
-        return list(dict.fromkeys(flown))
+        pairs: dict[tuple[Mission, str], None] = {}  # each once, in order
+        for regime in self.regimes:
+            for name in self.policies:
+                pairs[regime, registry.flown_name(name, regime)] = None
+        return list(pairs)
 
     @property
     def num_missions(self) -> int:
@@ -91,23 +92,27 @@ class Study:
         """All the work, pair by pair, in the order of the seeds."""
         seeds = range(self.seed, self.seed + self.episodes)
         parts = [seeds[start : start + BATCH_SIZE] for start in range(0, len(seeds), BATCH_SIZE)]
-        return tuple(
-            Batch(
-                policy=policy,
-                how=self._how(policy),
-                components=self.components,
-                parameters=self.parameters[regime, policy],
-                mission=regime,
-                seeds=part,
-            )
-            for regime, policy in self.pairs
-            for part in parts
-        )
+        batches: list[Batch] = []
+        for regime, policy in self.pairs:
+            for part in parts:
+                batch = Batch(
+                    policy=policy,
+                    how=self._how(policy),
+                    components=self.components,
+                    parameters=self.parameters[regime, policy],
+                    mission=regime,
+                    seeds=part,
+                )
+                batches.append(batch)
+        return tuple(batches)
 
     @cached_property
     def parameters(self) -> dict[tuple[Mission, str], Parameters]:
         """Parameters of each policy in each regime, as of the start of the study."""
-        return {pair: self.make_policy(pair[1], pair[0]).parameters for pair in self.pairs}
+        made: dict[tuple[Mission, str], Parameters] = {}
+        for regime, policy in self.pairs:
+            made[regime, policy] = self.make_policy(policy, regime).parameters
+        return made
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:
         """Make a policy as it is evaluated in a regime; refuse one whose packets never fit."""
@@ -116,15 +121,20 @@ class Study:
         return made
 
     def _how(self, policy: str) -> dict[str, Any]:
-        is_deterministic = self.is_deterministic and registry.is_learned(policy)
-        how = {"probability": self.probability, "is_deterministic": is_deterministic}
-        return how | {"features": self.features}
+        """Return the arguments of `make_policy` but for the policy's name and the mission."""
+        return {
+            "probability": self.probability,
+            # The others have no most probable recipient, and refuse to be asked for it.
+            "is_deterministic": self.is_deterministic and registry.is_learned(policy),
+            "features": self.features,
+        }
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """Return the name and the unit of a regime's task cost; None if its controller has none."""
         controller = self.components.made(regime).controller or controller_of(regime)
-        is_costed = isinstance(controller, Costed)
-        return (controller.cost_name, controller.cost_unit) if is_costed else None
+        if not isinstance(controller, Costed):
+            return None
+        return controller.cost_name, controller.cost_unit
 
     def config(self, policy: str, regime: Mission) -> dict[str, Any]:
         """All that a policy's missions in a regime depend on, but for their seeds."""

@@ -1,18 +1,26 @@
 """Results on the terminal: one table per regime, the lowest age first."""
 
 import io
-import tomllib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from itertools import groupby
-from pathlib import Path
 from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
+from swarm_mj.evaluation.results import (
+    BRIEF,
+    CARRIES_MORE,
+    NONE,
+    WIDE,
+    Result,
+    Shown,
+    carries_more,
+    config_of,
+    number,
+    said,
+)
 from swarm_mj.mission.presets import paper
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.protocol.packets import BITS_PER_BYTE
@@ -20,8 +28,6 @@ from swarm_mj.radio.words import bits_per_second
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the table
-NONE = "-"
-LEGEND = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 
 
 def results_text(results: Sequence[Result]) -> str:
@@ -41,19 +47,21 @@ def print_results(
     longest = max(len(line) for result in results for line in _name(result).splitlines())
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
     wide = Console(width=width, **how)
+    columns = WIDE if is_wide else BRIEF
     for regime, group in groupby(results, missions_of):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
-        wide.print(_table(of_regime, _cells if is_wide else _brief_cells))
+        # The wide table just fits, without spaces between its columns.
+        wide.print(_table(of_regime, columns, gap=0 if is_wide else 1))
         for line in _below(of_regime, is_wide=is_wide):
             console.print(line)
         console.print()
-    console.print(" ".join(_legend(results, is_wide=is_wide)))
+    console.print(" ".join(_legend(results, columns)))
 
 
 def missions_of(result: Result) -> str:
     """Return the missions that a result is of, in lines: results of others are not compared."""
-    parts: dict[str, object] = {
+    parts = {
         "radio": result.radio,
         "channel": result.channel,
         "controller": result.controller,
@@ -63,103 +71,44 @@ def missions_of(result: Result) -> str:
         "prior knowledge": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
     }
     own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
-    fates = ", robots collide" if config_of(result).get("collide") else ""
+    fates = ""
+    if config_of(result).get("collide"):
+        fates += ", robots collide"
     if result.failure_fraction:
         fates += f", {result.failure_fraction:.0%} of the robots off half-way"
-    flown = f"{result.episodes} mission{'s' * (result.episodes != 1)} from seed {result.seed}"
-    usual, moves = paper("stationary"), "\n"
+    missions = "1 mission" if result.episodes == 1 else f"{result.episodes} missions"
+    usual = paper("stationary")
     # At rest neither counts, but what was asked for tells missions apart.
-    motion = (result.task, result.velocity_ratio, result.boundary)
-    if motion != (usual.task, usual.velocity_ratio, usual.boundary):
+    is_usual = (
+        result.task == usual.task
+        and result.velocity_ratio == usual.velocity_ratio
+        and result.boundary == usual.boundary
+    )
+    moves = "\n"
+    if not is_usual:
         moves = f" velocity ratio {result.velocity_ratio:g},\nboundary {result.boundary}, "
     return (
         f"{result.task}, preset {result.preset}: {result.num_robots} robots, range ratio "
         f"{result.range_ratio:g},{moves}{result.num_windows} windows of {result.physics} "
-        f"physics{fates}, {flown}{own}"
+        f"physics{fates}, {missions} from seed {result.seed}{own}"
     )
 
 
-def _table(results: Sequence[Result], cells_of: Callable[[Result], dict[str, str]]) -> Table:
-    gap = 0 if cells_of is _cells else (0, 1)
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=gap)
+def _table(results: Sequence[Result], columns: Sequence[Shown], *, gap: int) -> Table:
+    """Return the table of a regime, whose first result decides which columns there are."""
+    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap))
     table.add_column("policy", no_wrap=True)
-    rows = [cells_of(result) for result in results]
-    headings = list(rows[0])
-    for heading in headings:
-        table.add_column(heading, justify="right")
-    for result, cells in zip(results, rows, strict=True):
-        table.add_row(_name(result), *(cells.get(heading, NONE) for heading in headings))
+    shown = [column for column in columns if _applies(column, results[0])]
+    for column in shown:
+        table.add_column(said(column.heading, results[0]), justify="right")
+    for result in results:
+        cells = [column.cell(result) if _applies(column, result) else NONE for column in shown]
+        table.add_row(_name(result), *cells)
     return table
 
 
-def _brief_cells(result: Result) -> dict[str, str]:
-    """Return the cells that most people read, in one line."""
-    heard = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
-    mean, interval = _difference(result, "aoi").split("\n")
-    own_cost = {}
-    if _has_own_cost(result):
-        own_cost["task cost ± SEM"] = _plus_minus(result.task_cost_mean, result.task_cost_sem)
-    return {
-        "AoI ± SEM": _plus_minus(result.aoi_mean, result.aoi_sem),
-        f"minus {result.baseline}'s [95 %]": f"{mean} [{interval}]" if interval else mean,
-        **own_cost,
-        "heard": _number(heard, ".0%"),
-    }
-
-
-def _cells(result: Result) -> dict[str, str]:
-    """Return a result's cells, of one or two lines, by the headings of their columns."""
-    # Requests reach their addressee, broadcasts at least one robot.
-    reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
-    mean = _plus_minus(result.aoi_mean, result.aoi_sem)
-    cells = {
-        "AoI ± SEM\n95 %": f"{mean}\n{_interval(result.aoi_ci_low, result.aoi_ci_high)}",
-        "median\np95": f"{result.aoi_median:.2f}\n{result.aoi_p95:.2f}",
-        "difference\n95 %": _difference(result, "aoi"),
-        "packets\nreached": f"{result.packets_per_window:.2f}\n{_number(reached, '.0%')}",
-        "hearers\nbytes": (
-            f"{_number(result.hearers_per_packet)}\n{_number(result.packet_bytes, ',d')}"
-        ),
-    }
-    published = _plus_minus(result.published_aoi_mean, result.published_aoi_sem)
-    if _has_own_cost(result):
-        whole = _plus_minus(result.task_cost_mean, result.task_cost_sem)
-        last = _plus_minus(result.task_cost_last_mean, result.task_cost_last_sem)
-        cells["task cost\nat the end"] = f"{whole}\n{last}"
-        cells["difference\nof task cost"] = _difference(result, "task_cost")
-    elif result.task == "flocking":
-        variance = result.published_velocity_variance_mean
-        cells["velocity\nvariance"] = f"{result.velocity_variance_mean:.4f}"
-        cells["published\nAoI, var."] = (
-            published if variance is None else f"{published}\n{variance:.4f}"
-        )
-    else:
-        cells["published\nAoI"] = published
-    return cells
-
-
-def _number(value: float | None, form: str = ".2f") -> str:
-    return NONE if value is None else format(value, form)
-
-
-def _plus_minus(mean: float | None, sem: float | None) -> str:
-    return _number(mean) if sem is None else f"{_number(mean)} ± {sem:.2f}"
-
-
-def _interval(low: float | None, high: float | None) -> str:
-    """Return both ends, or nothing where there is no interval."""
-    return "" if low is None or high is None else f"{low:.2f}, {high:.2f}"
-
-
-def _difference(result: Result, cost: str) -> str:
-    mean, low, high = (
-        getattr(result, f"{cost}_difference_{figure}") for figure in ("mean", "ci_low", "ci_high")
-    )
-    return f"{_number(mean)}\n{_interval(low, high)}"
-
-
-def _has_own_cost(result: Result) -> bool:
-    return result.task_cost_name not in (None, Flocking.cost_name)
+def _applies(column: Shown, result: Result) -> bool:
+    return column.applies is None or column.applies(result)
 
 
 def _name(result: Result) -> str:
@@ -187,17 +136,19 @@ def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
         yield f"lower bound (connectivity): {shown}"
 
 
-def _legend(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
-    """Yield the meanings of the columns, a sentence each."""
-    yield LEGEND["age"]
-    yield LEGEND["wide" if is_wide else "brief"].format(results[0].baseline)
-    costs = [f"{r.task_cost_name} [{r.task_cost_unit}]" for r in results if _has_own_cost(r)]
-    yield from (LEGEND["task_cost"].format(cost) for cost in dict.fromkeys(costs))
-    if is_wide and any(result.task == "flocking" for result in results):
-        yield LEGEND["velocity_variance"]
-    if is_wide and any(result.published_aoi_mean is not None for result in results):
-        yield LEGEND["published"]
-    if any(_number(result.aoi_floor_mean) not in (NONE, "0.00") for result in results):
-        yield LEGEND["lower_bound"]
+def _legend(results: Sequence[Result], columns: Sequence[Shown]) -> Iterator[str]:
+    """Yield the meanings of the columns, a sentence each or more; then of what stands below."""
+    for column in columns:
+        if column.applies is None:
+            yield said(column.meaning, results[0])
+    for column in columns:
+        if column.applies is not None:
+            # Each sentence once, in the order of the results.
+            meanings = dict.fromkeys(said(column.meaning, result) for result in results)
+            yield from filter(None, meanings)
+    if any(number(result.aoi_floor_mean) not in (NONE, "0.00") for result in results):
+        yield (
+            "Lower bound: the AoI if all robots with a path between them shared everything at once."
+        )
     if any(map(carries_more, results)):
-        yield LEGEND["payload"].format(CARRIES_MORE)
+        yield f"+: packets {CARRIES_MORE}, which the paper's carry."

@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.evaluation.batch import BatchCosts, costs_of
-from swarm_mj.evaluation.summary import standard_error
+from swarm_mj.evaluation.samples import standard_error
 from swarm_mj.learning import selection
 from swarm_mj.learning.selection import COMPARED, JUDGED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
 from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED, Training

@@ -210,3 +210,13 @@ class Mission:
     def grants(self, what: str) -> bool:
         """Return whether robots know this before the mission."""
         return what in self.prior_knowledge.split(",")
+
+    @property
+    def moves(self) -> bool:
+        """True if the robots move, in whatever way; a team at rest does not (IV-A)."""
+        return self.task != "stationary"
+
+    @property
+    def flocks(self) -> bool:
+        """True if the robots are to agree on one velocity (IV-A)."""
+        return self.task == "flocking"

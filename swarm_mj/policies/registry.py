@@ -35,7 +35,7 @@ PAYLOADS = ("snapshots", "none")  # the planner's own, which at rest is links, o
 
 
 def _planner(mission: Mission) -> Planner | RestingPlanner:
-    if mission.task != "stationary":
+    if mission.moves:
         return Planner(mission)
     return RestingPlanner(mission, learns=fits(packet_of(mission, link_fields(mission)), mission))
 
@@ -168,7 +168,7 @@ def missions_memory(name: str, mission: Mission, num_missions: int = 1) -> float
     num_robots, policy_pair = mission.num_robots, 0.0
     rounds, pair, robot = PAIR_BYTES.get(name.partition(" ")[0], (0.0, 0.0, 0.0))
     if mission.num_windows > rounds * num_robots:
-        policy_pair = pair + robot * num_robots * (mission.task != "stationary")
+        policy_pair = pair + robot * num_robots * mission.moves
     learned = is_learned(name)
     return needs.missions_memory(num_robots, num_missions, policy_pair, is_learned=learned)
 
@@ -196,7 +196,7 @@ def flown_name(name: str, mission: Mission) -> str:
     Without a payload, robots that move cannot agree on a plan, so they fly `spatial-tdma`. Tables
     and charts say so, and show it once.
     """
-    return "spatial-tdma" if name == WITHOUT_PAYLOAD and mission.task != "stationary" else name
+    return "spatial-tdma" if name == WITHOUT_PAYLOAD and mission.moves else name
 
 
 def with_payload(names: Sequence[str], payload: str) -> list[str]:

@@ -49,12 +49,13 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
     if not rows:
         raise ValueError(
             f"{policy_name} has no tuned probability for {mission.preset} {mission.task} missions; "
-            "pass one, or run tools/tune.py"
+            "give one (--probability P, or probability=P in Python), choose a policy that needs "
+            "none, or tune it: tools/tune.py makes the rows of policies/tuned.csv"
         )
 
     def distance(row: Tuned) -> float:  # between regimes: in logarithms, squared
         ratios = [row.num_robots / mission.num_robots, row.range_ratio / mission.range_ratio]
-        if mission.task != "stationary":
+        if mission.moves:
             ratios.append(row.velocity_ratio / mission.velocity_ratio)
         return sum(math.log(ratio) ** 2 for ratio in ratios)
 

@@ -198,7 +198,7 @@ def plots(log: Log) -> list[Plot]:
     if log.is_compared:
         found.append(_link_plot(log))
     cost = log.task_cost
-    if cost is None and log.facts.mission.task == "flocking":
+    if cost is None and log.facts.mission.flocks:
         variance = log.velocity_variance_m2ps2
         cost = TaskCost(name="velocity variance", unit="m²/s²", value=variance)
     if cost is not None:

@@ -1,6 +1,8 @@
 """Python finds what `swarm-mj evaluate` finds, to the last digit."""
 
 import json
+import re
+from textwrap import dedent
 
 import numpy as np
 import pytest
@@ -134,3 +136,11 @@ def test_a_studys_files_grow_with_its_missions():
     few, many = (module.study_needs(study, 1).file for study in studies)
     assert many == pytest.approx(1000 * few)
     assert many > 5e8
+
+
+@pytest.mark.parametrize("documented", [swarm_mj.fly, swarm_mj.evaluate, swarm_mj.Evaluation])
+@pytest.mark.usefixtures("here")
+def test_the_examples_of_docstrings_run(capsys, documented):
+    (example,) = re.findall(r"```python\n(.*?)```", documented.__doc__, re.DOTALL)
+    exec(dedent(example), {})
+    assert capsys.readouterr().out

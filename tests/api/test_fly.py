@@ -1,7 +1,4 @@
-"""Python flies what the command line flies, to the last digit; what a flight takes, by hand.
-
-tests/faults/test_fit.py compares estimates with peaks.
-"""
+"""Python flies what the command line flies, to the last digit."""
 
 import json
 import math
@@ -14,7 +11,7 @@ import numpy as np
 import pytest
 
 import swarm_mj
-from swarm_mj.api import fly as flight
+from swarm_mj.api import flight
 from swarm_mj.cli import main
 from swarm_mj.mission import paper
 from swarm_mj.policies.policy import DecentralisedPolicy
@@ -22,7 +19,6 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.needs import FLYING
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
@@ -178,30 +174,3 @@ def test_memory_is_looked_at_before_the_work(monkeypatch):
     monkeypatch.setattr("swarm_mj.system.needs.free_memory", lambda: 1e6)
     with pytest.raises(ValueError, match="choose fewer num_robots or num_windows, or record=False"):
         swarm_mj.fly(**SHORT)
-
-
-def test_a_small_mission_is_flown_ahead_also_for_a_policy_of_one_s_own(monkeypatch):
-    flown = []
-    monkeypatch.setattr(flight, "summarise", lambda windows: flown.append(len(list(windows))))
-    for own in ("nowhere:Mine", "Silent"):
-        flight.compile_ahead(paper("stationary", num_windows=4), own, probability=0.2)
-    assert flown == [flight.COMPILING_WINDOWS] * 2
-
-
-def test_missions_take_at_least_their_buffers():
-    mission = paper("stationary", num_robots=200)
-    made = sum(array.nbytes for array in vars(Swarm(mission, [1]).buffers).values())
-    needs = flight.flight_needs(mission, "tdma", is_recorded=False)
-    assert made < needs.memory - FLYING < 2.0 * made
-
-
-def test_a_long_flight_of_many_takes_what_nobody_has():
-    """By hand: 765 kB of memory a window, 110.8 kB of disk."""
-    long = paper("random-walk", num_robots=1000, num_windows=100_000)
-    needs = flight.flight_needs(long, "tdma", is_recorded=True)
-    assert needs.memory == pytest.approx(1e5 * 765e3, rel=0.01)
-    assert needs.file == pytest.approx(1e5 * 110.8e3, rel=0.01)
-    bare, learned = (flight.flight_needs(long, p, is_recorded=False) for p in ("tdma", "gnn"))
-    assert (bare.memory < 0.3e9, bare.file) == (True, 0.0)
-    # torch, and the packets that a learned policy's robots remember
-    assert learned.memory - bare.memory > 4 * 1000**3

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from forks import files
 
-from swarm_mj.api import fly as flight
+from swarm_mj.api import flight
 from swarm_mj.cli import fly, main, parse
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy

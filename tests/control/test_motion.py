@@ -1,4 +1,5 @@
 import math
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -14,12 +15,12 @@ from swarm_mj.control.motion import (
     flocking,
     initial_velocity,
 )
-from swarm_mj.mission import paper, reference
+from swarm_mj.mission import Task, paper, reference
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import empty_buffers
 
-TASKS = ["stationary", "random-walk", "flocking"]
+TASKS = get_args(Task)
 FLOCKING_SETS = ["heard", "moving"]
 SEEDS = st.integers(0, 2**32 - 1)
 
@@ -162,3 +163,15 @@ def test_who_has_a_cost_says_so():
     assert isinstance(controller_of(paper("stationary")), Controller)
     assert not isinstance(controller_of(paper("stationary")), Costed)
     assert isinstance(controller_of(paper("flocking")), Costed)
+
+
+@pytest.mark.parametrize(
+    ("task", "moves", "flocks"),
+    [("stationary", False, False), ("random-walk", True, False), ("flocking", True, True)],
+)
+def test_missions_say_what_their_task_asks_of_robots(task, moves, flocks):
+    mission = paper(task, num_robots=5)
+    assert (mission.moves, mission.flocks) == (moves, flocks)
+    velocity_mps = initial_velocity(mission, np.random.default_rng(0))
+    assert np.any(velocity_mps != 0.0) == moves
+    assert isinstance(controller_of(mission), Costed) == flocks

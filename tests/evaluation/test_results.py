@@ -1,13 +1,23 @@
 """Result files: written and read back as they were, and refused with a reason otherwise."""
 
 import csv
-from dataclasses import asdict, fields
+from dataclasses import asdict, dataclass, fields
 from types import NoneType
 from typing import get_args
 
 import pytest
 
-from swarm_mj.evaluation.results import COLUMNS, Result, read_results, write_results
+from swarm_mj.evaluation.measured import column, later_column
+from swarm_mj.evaluation.results import (
+    BRIEF,
+    COLUMNS,
+    WIDE,
+    Result,
+    computation,
+    read_results,
+    said,
+    write_results,
+)
 
 TEXTS = {
     "policy": "mst",
@@ -108,3 +118,34 @@ def test_a_file_that_was_cut_off_is_refused(tmp_path):
     (tmp_path / "r.csv").write_text(text[:-3])
     with pytest.raises(ValueError, match=r"no CSV \(unexpected end of data\)"):
         read_results(tmp_path / "r.csv")
+
+
+def test_a_column_that_nothing_computes_is_named_at_once():
+    """`Result` is checked by the same function when it is imported."""
+
+    @dataclass(kw_only=True)
+    class Planted:
+        median: float = column(lambda own: own.aoi.median)
+        newest: float | None = later_column(lambda own: own.aoi.std, older=None)
+        forgotten: float | None = None
+
+    median, newest, forgotten = fields(Planted)
+    assert callable(computation(median))
+    assert callable(computation(newest))
+    with pytest.raises(TypeError, match=r"nothing computes the column forgotten of Result; decl"):
+        computation(forgotten)
+    assert tuple(spec.name for spec in fields(Result)) == COLUMNS
+
+
+@pytest.mark.parametrize("columns", [BRIEF, WIDE])
+@pytest.mark.parametrize("cost", ["velocity variance", "spread"])
+@pytest.mark.parametrize("task", ["stationary", "flocking"])
+def test_every_column_shown_has_a_heading_of_its_own_and_at_most_two_lines(columns, cost, task):
+    result = some_result(task=task, task_cost_name=cost)
+    shown = [each for each in columns if each.applies is None or each.applies(result)]
+    headings = [said(each.heading, result) for each in shown]
+    assert len(set(headings)) == len(headings)
+    for heading, column_shown in zip(headings, shown, strict=True):
+        cell = column_shown.cell(result)
+        assert cell
+        assert max(heading.count("\n"), cell.count("\n")) <= 1

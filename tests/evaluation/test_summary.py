@@ -1,4 +1,4 @@
-"""Results of made-up batches, and their statistics, against hand arithmetic and scipy."""
+"""Results of made-up batches, against hand arithmetic and scipy."""
 
 import json
 import math
@@ -12,13 +12,7 @@ from swarm_mj.evaluation import study as study_module
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.results import COLUMNS
 from swarm_mj.evaluation.study import Study
-from swarm_mj.evaluation.summary import (
-    bootstrap_interval,
-    quantile_of_counts,
-    spread,
-    study_results,
-    write_evaluated,
-)
+from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.mission import paper, reference
 
 STATIONARY = reference("stationary")
@@ -232,43 +226,3 @@ def test_json_has_the_columns_with_each_missions_costs(tmp_path):
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_evaluated(tmp_path / "r.json", [replace(found[0], aoi=[math.nan])])
     assert not list(tmp_path.iterdir())
-
-
-def test_the_interval_is_near_a_plain_bootstraps_and_students():
-    samples = np.random.default_rng(1).normal(50.0, 10.0, size=100)
-    low, high = bootstrap_interval(samples)
-    rng = np.random.default_rng(2)
-    means = [rng.choice(samples, 100).mean() for _ in range(4000)]
-    student = scipy.stats.t.interval(0.95, 99, samples.mean(), scipy.stats.sem(samples))
-    for expected in (np.percentile(means, [2.5, 97.5]), student):
-        np.testing.assert_allclose([low, high], expected, atol=0.15)
-
-
-def test_the_interval_of_skewed_samples_leans_to_their_tail():
-    """What "bias-corrected and accelerated" is for."""
-    samples = np.random.default_rng(3).lognormal(sigma=1.5, size=40)
-    low, high = bootstrap_interval(samples)
-    assert high - samples.mean() > 1.3 * (samples.mean() - low)
-
-
-@pytest.mark.parametrize(
-    "samples", [[7.0], [0.0, 0.0], [3.0] * 50, [0.1 + 0.2, 0.3, 0.3], [-5.0, -5.0]]
-)
-def test_samples_that_do_not_vary_have_no_interval(samples):
-    assert bootstrap_interval(np.array(samples)) == (None, None)
-    found = spread(np.array(samples))
-    assert (found["ci_low"], found["ci_high"]) == (None, None)
-
-
-@pytest.mark.parametrize(
-    ("counts", "share", "expected"),
-    [
-        ([95, 5], 0.95, 0),  # exactly 95 % lie in bin 0
-        ([94, 6], 0.95, 1),
-        ([0, 0, 1], 0.95, 2),
-        ([0, 3, 1, 0], 1.0, 2),
-        ([0, 3, 1, 0], 0.0, 0),
-    ],
-)
-def test_quantile_of_counts_by_hand(counts, share, expected):
-    assert quantile_of_counts(np.array(counts), share) == expected

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from swarm_mj.api import fly as flight
+from swarm_mj.api import flight
 from swarm_mj.cli import main
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import fly_batch

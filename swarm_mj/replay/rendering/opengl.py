@@ -92,9 +92,10 @@ def variables_of(name: str) -> dict[str, str]:
 
 def render_nothing() -> None:
     """Draw an empty scene by the back end that MUJOCO_GL names; raises what that raises."""
-    import mujoco  # which settles on a back end
+    from mujoco import Renderer  # which settles on a back end
+    from mujoco._structs import MjModel
 
-    with mujoco.Renderer(mujoco.MjModel.from_xml_string("<mujoco/>"), 32, 32) as renderer:
+    with Renderer(MjModel.from_xml_string("<mujoco/>"), 32, 32) as renderer:
         renderer.render()
 
 

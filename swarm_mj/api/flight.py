@@ -1,0 +1,220 @@
+"""One flight, as `swarm_mj.fly` and `swarm-mj fly` share it: what flies, and how it ends.
+
+A flight ends early without loss: Ctrl-C ends it after a whole window, and so does a lack of memory
+while there is enough to write the windows flown.
+"""
+
+import gc
+import time
+from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import asdict, dataclass, replace
+from typing import Any, NamedTuple
+
+import numpy as np
+from rich.console import Console
+
+from swarm_mj.api.flight_table import flight_numbers
+from swarm_mj.api.run import Metrics, Run
+from swarm_mj.mission import Mission
+from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.policies import registry
+from swarm_mj.policies.policy import Policy
+from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observer
+from swarm_mj.simulation.components import Components
+from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system import needs
+from swarm_mj.system.compiled import compiling
+from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
+from swarm_mj.system.interrupt import deferred_interrupt
+from swarm_mj.system.needs import Needs, free_memory, in_gb, memory_errors
+from swarm_mj.system.packages import commit, version
+from swarm_mj.system.terminal import WorkBar
+
+WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
+COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
+SECOND_LOOK_S = 0.5  # memory that others have just freed may still be counted for so long
+
+
+@dataclass(frozen=True, kw_only=True)
+class Flight:
+    """A mission, and all that flies it."""
+
+    mission: Mission
+    policy: Policy
+    policy_name: str  # of which the registry made the policy; of a user's own object, its class's
+    probability: float | None = None  # that was asked for, as of `make_policy`
+    is_deterministic: bool = False  # likewise
+    features: Sequence[str] = ()  # likewise
+    components: Components = Components()
+    seed: int
+    observer: int = 0  # the robot whose knowledge the replay shows
+    is_recorded: bool = True
+
+    def config(self) -> dict[str, Any]:
+        """Return all that the flight depends on, for replays and summaries."""
+        return {
+            **asdict(self.mission),
+            "policy": self.policy_name,
+            **self.policy.parameters,
+            "packet_bytes": self.policy.packet(self.mission).num_bytes,
+            "seed": int(self.seed),  # NumPy's numbers are no JSON
+            "observer": int(self.observer),
+            "version": version(),
+            "commit": commit(),
+            **self.components.names,
+        }
+
+
+class Flown(NamedTuple):
+    """A mission flown, its record if there is one, and how the flight ended."""
+
+    run: Run  # whose log is not made yet
+    recorder: Recorder | None
+    code: int  # an exit code
+    ending: str  # why it ended early, and when; empty if it did not
+
+    @property
+    def recorded(self) -> Run:
+        """The run with its log, if it was recorded."""
+        run = self.run
+        return replace(run, log=self.recorder.log(run.config)) if self.recorder else run
+
+
+def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flown:
+    """Fly a mission from the first window to the last.
+
+    Args:
+        flight: What flies.
+        console: Where a bar shows how far it is.
+        way_on: The end of the message that memory ran short; None flies on regardless.
+
+    Raises:
+        MemoryError: Memory did not suffice for one window.
+        ValueError: As of `Swarm` and `rollout`; the observer is no robot, or features were named
+            that the policy has not.
+    """
+    mission = flight.mission
+    check_observer(flight.observer, mission.num_robots)
+    registry.check_used(flight.features, [flight.policy])
+    with console.status("Preparing the swarm ...") as status, compiling(status.update):
+        swarm = Swarm(mission, [flight.seed], **flight.components.given)
+        swarm.start(flight.policy)
+        recorder = Recorder(swarm, ego=flight.observer) if flight.is_recorded else None
+        compile_ahead(
+            mission,
+            flight.policy_name,
+            probability=flight.probability,
+            is_deterministic=flight.is_deterministic,
+            features=flight.features,
+        )
+    bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
+    start_s = time.perf_counter()
+    windows, code, ending = _fly_windows(swarm, recorder, bar, way_on)
+    wall_s = time.perf_counter() - start_s
+
+    numbers = flight_numbers(mission, flight.policy, summarise(windows))
+    numbers["wall_seconds"] = wall_s
+    numbers["interrupted"] = code != DONE
+    numbers["heard_share"] = _heard_share(swarm)
+    run = Run(
+        mission=mission,
+        config=flight.config(),
+        summary=Metrics(numbers),
+        windows=tuple(windows),
+    )
+    if ending:
+        ending += f" after {len(windows)} of {mission.num_windows} windows"
+    return Flown(run=run, recorder=recorder, code=code, ending=ending)
+
+
+def _fly_windows(
+    swarm: Swarm, recorder: Recorder | None, bar: WorkBar, way_on: str | None
+) -> tuple[list[WindowRecord], int, str]:
+    """Return the windows flown, an exit code and why they are not all; MemoryError if none."""
+    flown: list[WindowRecord] = []
+    # Unless it ends otherwise, below.
+    code = FAILED
+    ending = "Out of memory"
+    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
+        for window in rollout(swarm):
+            if recorder:
+                recorder.add(window)
+            flown.append(window)
+            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
+            bar.advance()
+            if is_interrupted():
+                code = INTERRUPTED
+                ending = "Interrupted"
+                break
+            is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
+            if recorder and is_time:
+                short = _shortage(swarm.mission, len(flown), recorder)
+                if short:
+                    ending = f"Memory ran short ({short}{way_on})"
+                    break
+        else:
+            code = DONE
+            ending = ""
+    if not flown:
+        raise MemoryError
+    return flown, code, ending
+
+
+def _heard_share(swarm: Swarm) -> float:
+    """Return the share of the pairs of active robots of which the first has heard of the second."""
+    is_known = swarm.buffers.is_known[0]
+    if swarm.states.is_active is not None:
+        is_on = swarm.states.is_active[0]
+        is_known = is_known[is_on][:, is_on]
+    own = len(is_known)  # a robot knows itself
+    return float((np.sum(is_known) - own) / (is_known.size - own))
+
+
+def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:
+    """Return a message if memory does not suffice to write the replay, at a second look either."""
+    needed = IN_MEMORY.of(mission, num_windows) - recorder.num_bytes
+    if free_memory() >= needed:
+        return None
+    gc.collect()
+    time.sleep(SECOND_LOOK_S)
+    free = free_memory()
+    short = f"{in_gb(free)} are free, writing the replay takes {in_gb(needed)}"
+    return short if free < needed else None
+
+
+def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
+    """Return the memory and disk that a flight takes."""
+    memory = registry.missions_memory(policy, mission) + (needs.FLYING - needs.LIBRARIES)
+    if not is_recorded:
+        return Needs(memory=memory)
+    num = mission.num_windows
+    return Needs(memory=memory + IN_MEMORY.of(mission, num), file=ON_DISK.of(mission, num))
+
+
+def compile_ahead(
+    mission: Mission,
+    policy_name: str,
+    *,
+    probability: float | None = None,
+    is_deterministic: bool = False,
+    features: Sequence[str] = (),
+) -> None:
+    """Fly a small mission of this kind, beyond half-way, so that compiling is not timed."""
+    # A stored policy may be for teams of one size, and a file's arena does not shrink.
+    is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
+    robots = mission.num_robots if is_bound else 3
+    smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
+    if policy_name in registry.POLICIES or registry.is_stored(policy_name):
+        policy = registry.make_policy(
+            policy_name,
+            smallest,
+            probability,
+            is_deterministic=is_deterministic,
+            features=features,
+        )
+    else:
+        # A user's own may be made for one mission only, or be an object, which flies only once.
+        policy = registry.make_policy("tdma", smallest)
+    summarise(rollout(Swarm(smallest, [0]), policy))

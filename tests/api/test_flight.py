@@ -1,0 +1,54 @@
+"""What a flight takes, by hand, and what it is made of.
+
+tests/faults/test_fit.py compares estimates with peaks.
+"""
+
+import pytest
+
+from swarm_mj.api import flight
+from swarm_mj.mission import paper
+from swarm_mj.policies.registry import make_policy
+from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.needs import FLYING
+from swarm_mj.system.terminal import quiet_console
+
+
+def test_the_commands_engine_flies_what_it_is_told_and_says_so():
+    mission = paper("random-walk", num_robots=4, num_windows=6)
+    policy = make_policy("mst", mission, 0.25)
+    told = flight.Flight(
+        mission=mission, policy=policy, policy_name="mst", seed=3, probability=0.25, observer=2
+    )
+    flown = flight.fly_mission(told, console=quiet_console(), way_on=None)
+    assert (flown.code, flown.ending) == (0, "")
+    config = flown.recorded.config
+    assert (config["policy"], config["probability"]) == ("mst", 0.25)
+    assert (config["seed"], config["observer"], config["num_robots"]) == (3, 2, 4)
+    assert len(flown.run.windows) == len(flown.recorded.footage().window) == 6
+
+
+def test_a_small_mission_is_flown_ahead_also_for_a_policy_of_one_s_own(monkeypatch):
+    flown = []
+    monkeypatch.setattr(flight, "summarise", lambda windows: flown.append(len(list(windows))))
+    for own in ("nowhere:Mine", "Silent"):
+        flight.compile_ahead(paper("stationary", num_windows=4), own, probability=0.2)
+    assert flown == [flight.COMPILING_WINDOWS] * 2
+
+
+def test_missions_take_at_least_their_buffers():
+    mission = paper("stationary", num_robots=200)
+    made = sum(array.nbytes for array in vars(Swarm(mission, [1]).buffers).values())
+    needs = flight.flight_needs(mission, "tdma", is_recorded=False)
+    assert made < needs.memory - FLYING < 2.0 * made
+
+
+def test_a_long_flight_of_many_takes_what_nobody_has():
+    """By hand: 765 kB of memory a window, 110.8 kB of disk."""
+    long = paper("random-walk", num_robots=1000, num_windows=100_000)
+    needs = flight.flight_needs(long, "tdma", is_recorded=True)
+    assert needs.memory == pytest.approx(1e5 * 765e3, rel=0.01)
+    assert needs.file == pytest.approx(1e5 * 110.8e3, rel=0.01)
+    bare, learned = (flight.flight_needs(long, p, is_recorded=False) for p in ("tdma", "gnn"))
+    assert (bare.memory < 0.3e9, bare.file) == (True, 0.0)
+    # torch, and the packets that a learned policy's robots remember
+    assert learned.memory - bare.memory > 4 * 1000**3
