@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.components import is_own, load, make
@@ -31,25 +31,27 @@ from swarm_mj.system.packages import asset, need
 FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
 PAYLOADS = ("snapshots", "none")  # the planner's own, which at rest is links, or nothing
 
-
 PACKAGE = __name__.rpartition(".")[0]
-# No policies by name are in these, and flying does without what they import.
-LEARNED = (f"{PACKAGE}.gnn", f"{PACKAGE}.stored")
+# Files and folders of trained networks, which are policies by their files, not by names; flying
+# does without the libraries that these import.
+LEARNED = ("gnn", "stored")
 
 
 def policy_classes() -> Iterator[type[Policy]]:
-    """Yield the classes of policies in this package, but for learned ones and common bases."""
+    """Yield the classes of policies in this package, but for trained networks and common bases."""
     for found in pkgutil.walk_packages([str(Path(__file__).parent)], f"{PACKAGE}."):
-        if found.name.startswith(LEARNED):
+        if found.name.removeprefix(f"{PACKAGE}.").partition(".")[0] in LEARNED:
             continue
         module = import_module(found.name)
-        for each in list(vars(module).values()):  # one of the modules is this one
-            is_policy = isinstance(each, type) and issubclass(each, Policy) and each is not Policy
-            is_defined_here = is_policy and each.__module__ == module.__name__
-            if is_defined_here and not (
-                inspect.isabstract(each) or issubclass(each, LearnedPolicy)
-            ):
+        for each in list(vars(module).values()):  # a copy, as one of the modules is this one
+            if isinstance(each, type) and each.__module__ == module.__name__ and _is_policy(each):
                 yield each
+
+
+def _is_policy(kind: type) -> TypeGuard[type[Policy]]:
+    if not issubclass(kind, Policy) or issubclass(kind, LearnedPolicy):
+        return False
+    return kind is not Policy and not inspect.isabstract(kind)
 
 
 def by_name(classes: Iterable[type[Policy]]) -> dict[str, type[Policy]]:
