@@ -7,7 +7,7 @@ declare an `About`; a policy of the package declares a `Listed`, from which `POL
 import re
 from dataclasses import dataclass
 from enum import Enum
-from typing import Literal
+from typing import Literal, NamedTuple
 
 from swarm_mj.mission import Mission
 
@@ -17,64 +17,96 @@ Marker = Literal[
 ]  # of matplotlib's, the ones that figures here use or may use
 
 
+class Kind(NamedTuple):
+    """A kind of information: what tables call it, and a sentence on what it is."""
+
+    label: str
+    sentence: str
+
+
 class Information(Enum):
-    """A kind of information beyond the paper's: what tables call it, and a sentence.
+    """The kinds of information beyond the paper's.
 
     The paper grants each robot its own buffer of T, M, P and L, and to the baselines of IV-C what
     they are defined by. Tables have these in the order below.
     """
 
-    COMMON_ORDER = (
-        "common order",
-        "Identities, or a random order of the robots, which all robots know.",
+    COMMON_ORDER = Kind(
+        label="common order",
+        sentence="Identities, or a random order of the robots, which all robots know.",
     )
-    CLOCK = (
-        "clock",
-        "All robots count slots from the same start, and decide by the number of a slot.",
+    CLOCK = Kind(
+        label="clock",
+        sentence="All robots count slots from the same start, and decide by the number of a slot.",
     )
-    TEAM_SIZE = ("team size", "The number N of robots.")
-    OBSERVED_POSITIONS = (
-        "positions as observed",
-        "Positions in M, its own and its teammates': exact as in the paper, or with the errors of "
-        "`--position-noise-m`.",
+    TEAM_SIZE = Kind(
+        label="team size",
+        sentence="The number N of robots.",
     )
-    TRUE_POSITIONS = ("true positions", "All positions at this moment, without errors.")
-    RADIO_CONSTANTS = ("radio constants", "The radio's range, noise and least SINR.")
-    COMMON_RANDOM_NUMBERS = (
-        "common random numbers",
-        "Random numbers of the whole team, which every robot draws alike.",
+    OBSERVED_POSITIONS = Kind(
+        label="positions as observed",
+        sentence=(
+            "Positions in M, its own and its teammates': exact as in the paper, or with the errors "
+            "of `--position-noise-m`."
+        ),
     )
-    ACKNOWLEDGEMENTS = (
-        "acknowledgements by T",
-        "T in a packet shows whether its sender decoded the robot's own last packet.",
+    TRUE_POSITIONS = Kind(
+        label="true positions",
+        sentence="All positions at this moment, without errors.",
     )
-    CARRIER_SENSING = (
-        "carrier sensing",
-        "The power in the channel just before the robot would transmit.",
+    RADIO_CONSTANTS = Kind(
+        label="radio constants",
+        sentence="The radio's range, noise and least SINR.",
     )
-    DECODED_PACKETS = (
-        "decoded packets",
-        "Whose packet the robot decoded in which slot; T, M and P say only part of it.",
+    COMMON_RANDOM_NUMBERS = Kind(
+        label="common random numbers",
+        sentence="Random numbers of the whole team, which every robot draws alike.",
     )
-    AREA = ("area", "The area, and so the density of robots.")
-    PRIOR_KNOWLEDGE = (
-        "prior knowledge",
-        "What `--prior-knowledge` grants of the channel: the map and statistics; to `planner` also "
-        "whether the team rests.",
+    ACKNOWLEDGEMENTS = Kind(
+        label="acknowledgements by T",
+        sentence="T in a packet shows whether its sender decoded the robot's own last packet.",
     )
-    POSITION_ERRORS = (
-        "errors of positions",
-        "The standard deviation of the errors of positions.",
+    CARRIER_SENSING = Kind(
+        label="carrier sensing",
+        sentence="The power in the channel just before the robot would transmit.",
     )
-    ALL_BUFFERS = ("all buffers", "The buffers of all robots at this moment.")
-    TRUE_CHANNEL = (
-        "true channel",
-        "The mean powers and the statistics of the channel that packets take.",
+    DECODED_PACKETS = Kind(
+        label="decoded packets",
+        sentence="Whose packet the robot decoded in which slot; T, M and P say only part of it.",
+    )
+    AREA = Kind(
+        label="area",
+        sentence="The area, and so the density of robots.",
+    )
+    PRIOR_KNOWLEDGE = Kind(
+        label="prior knowledge",
+        sentence=(
+            "What `--prior-knowledge` grants of the channel: the map and statistics; to `planner` "
+            "also whether the team rests."
+        ),
+    )
+    POSITION_ERRORS = Kind(
+        label="errors of positions",
+        sentence="The standard deviation of the errors of positions.",
+    )
+    ALL_BUFFERS = Kind(
+        label="all buffers",
+        sentence="The buffers of all robots at this moment.",
+    )
+    TRUE_CHANNEL = Kind(
+        label="true channel",
+        sentence="The mean powers and the statistics of the channel that packets take.",
     )
 
-    def __init__(self, label: str, sentence: str) -> None:
-        self.label = label
-        self.sentence = sentence
+    @property
+    def label(self) -> str:
+        """What tables call it."""
+        return self.value.label
+
+    @property
+    def sentence(self) -> str:
+        """What it is."""
+        return self.value.sentence
 
 
 @dataclass(frozen=True, kw_only=True)

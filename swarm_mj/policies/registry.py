@@ -39,7 +39,8 @@ LEARNED = ("gnn", "stored")
 
 def policy_classes() -> Iterator[type[Policy]]:
     """Yield the classes of policies in this package, but for trained networks and common bases."""
-    for found in pkgutil.walk_packages([str(Path(__file__).parent)], f"{PACKAGE}."):
+    folders = sys.modules[PACKAGE].__path__
+    for found in pkgutil.walk_packages(folders, f"{PACKAGE}."):
         if found.name.removeprefix(f"{PACKAGE}.").partition(".")[0] in LEARNED:
             continue
         module = import_module(found.name)
