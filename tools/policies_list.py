@@ -4,8 +4,9 @@ import re
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.policies import CARRIED, facts_of
+from swarm_mj.cli.policies import carried, facts_of
 from swarm_mj.mission import Task, paper
+from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import POLICIES, WITHOUT_PAYLOAD, make_policy
 
 HEADS = ("policy", "window", "what each robot uses", "packets carry beyond T, M, P", "bytes")
@@ -34,12 +35,13 @@ def _tasks(name: str) -> tuple[tuple[Task, str], ...]:
 
 def _row(name: str, task: Task, when: str) -> tuple[str, ...]:
     mission = paper(task, num_robots=NUM_ROBOTS)
-    facts = facts_of(name, make_policy(name, mission), mission)
+    policy = make_policy(name, mission)
+    facts = facts_of(name, policy, mission)
     return (
         f"`{name}`{when}",
         WINDOWS[facts["window"]],
         _used(facts),
-        _carried(facts["payload"]),
+        _carried(policy),
         f"{facts['packet_bytes']:,}",
     )
 
@@ -49,5 +51,5 @@ def _used(facts: dict[str, Any]) -> str:
     return f"*centralised:* {text}" if facts["is_centralised"] else text
 
 
-def _carried(payload: str) -> str:
-    return "nothing" if payload == "none" else f"{payload}: {CARRIED[payload]}"
+def _carried(policy: Policy) -> str:
+    return "nothing" if policy.payload == "none" else carried(policy)

@@ -148,7 +148,7 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
     ends = [getattr(result, f"{cost}_ci_{end}") for end in ("low", "high")]
     if None not in ends:
         axes.hlines(place, *ends, color=look.colour, linewidth=3.0, alpha=0.45)
-    axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.size + 2.0)
+    axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.marker_size + 2.0)
 
 
 def _axes(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes]]:

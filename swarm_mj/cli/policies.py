@@ -4,9 +4,7 @@ import inspect
 import json
 import shlex
 import sys
-import tomllib
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, ClassVar
 
 from rich.box import SIMPLE_HEAD
@@ -19,10 +17,10 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
     POLICIES,
     SHIPPED,
-    beyond_paper,
+    about_of,
     flown_name,
+    is_own_policy,
     make_policy,
-    uses_of,
 )
 from swarm_mj.protocol.packets import times
 from swarm_mj.system.exit_codes import DONE
@@ -30,9 +28,13 @@ from swarm_mj.system.fields import as_typed, common_setting, setting
 from swarm_mj.system.packages import is_installed, missing
 from swarm_mj.system.terminal import named_values, plain_console, this_command
 
-_WORDS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
-CARRIED: dict[str, str] = _WORDS["carried"]
 HEADINGS = {False: "each robot decides by itself", True: "a centre decides"}
+BROADCASTS, REQUEST = "broadcasts", "request"  # the forms of a window
+WINDOWS = {
+    BROADCASTS: "two broadcasts, which nobody answers",
+    REQUEST: "a request to a teammate, which answers",
+}
+T_M_P = "T, M, P: when each teammate was seen, its state, and who passed that on"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,26 +56,27 @@ def run(options: PoliciesOptions) -> int:
         if len(names) < len(flown):
             plain_console(is_error=True).print(missing("torch", f"{SHIPPED} is left out: it"))
     with Console(stderr=True).status("Loading ..."):
-        facts = [facts_of(name, make_policy(name, mission), mission) for name in names if name]
+        policies = {name: make_policy(name, mission) for name in names if name}
+        facts = [facts_of(name, policy, mission) for name, policy in policies.items()]
     if options.json:
         sys.stdout.write(json.dumps(facts if options.name is None else facts[0], indent=2) + "\n")
     elif options.name is None:
         _print_all(facts, mission)
     else:
-        _print_one(facts[0], mission)
+        _print_one(facts[0], policies[options.name], mission)
     return DONE
 
 
 def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
     """Return a policy's description of itself, as `--json` has it."""
-    kind, packet = type(policy), policy.packet(mission)
+    kind, packet, about = type(policy), policy.packet(mission), policy.about
     entries = [times(field, packet.num_entries) for field in packet.entry]
     return {
         "name": name,
         "is_centralised": policy.is_centralised,
-        "window": "broadcasts" if policy.window(mission).is_broadcast else "request",
-        "uses": uses_of(name, policy),
-        "beyond_paper": beyond_paper(flown_name(name, mission), policy),
+        "window": BROADCASTS if policy.window(mission).is_broadcast else REQUEST,
+        "uses": _uses(name, policy, mission),
+        "beyond_paper": None if about is None else [kind.label for kind in about.beyond],
         "payload": policy.payload,
         "packet_bytes": packet.num_bytes,
         "packet_fields": [
@@ -86,6 +89,13 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
         "class": f"{kind.__module__}.{kind.__qualname__}",
         "description": inspect.getdoc(kind) or "",
     }
+
+
+def _uses(name: str, policy: Policy, mission: Mission) -> str:
+    """Return the information that a policy decides by, in a few words; empty if it is unknown."""
+    # Where another policy flies under this name, the name's own words say so.
+    about = policy.about if flown_name(name, mission) == name else about_of(name)
+    return policy.uses if about is None else about.uses
 
 
 def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
@@ -103,16 +113,19 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
     plain_console().print(f"Packets are those for {_described(mission)}.\n{more}")
 
 
-def _print_one(each: dict[str, Any], mission: Mission) -> None:
-    names = ["T, M, P"] + ([] if each["payload"] == "none" else [each["payload"]])
-    carried = [f"{name}: {CARRIED[name]}" if name in CARRIED else name for name in names]
-    beyond = each["beyond_paper"]  # None where nobody has listed it, as of a user's own policy
+def carried(policy: Policy) -> str:
+    """Return what packets carry beyond T, M and P, with its meaning if the policy says it."""
+    payload = None if policy.about is None else policy.about.payload
+    return policy.payload if payload is None else f"{payload.name}: {payload.meaning}"
+
+
+def _print_one(each: dict[str, Any], policy: Policy, mission: Mission) -> None:
     rows = {
         "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
-        **({} if beyond is None else {"beyond the paper": ", ".join(beyond) or "nothing"}),
-        "in a window": _WORDS["windows"][each["window"]],
-        "packets carry": "\n".join(carried),
+        **_beyond_paper(each),
+        "in a window": WINDOWS[each["window"]],
+        "packets carry": T_M_P if policy.payload == "none" else f"{T_M_P}\n{carried(policy)}",
         "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},
         "source": each["class"],
@@ -125,9 +138,19 @@ def _print_one(each: dict[str, Any], mission: Mission) -> None:
         step = f"{field['step']:.3g} {field['unit']}" if "step" in field else ""
         packet.add_row(field["name"], str(field["bits"]), f"{field['count']:,}", step)
     Console(highlight=False).print(named_values(each["name"], rows), packet)
-    policy = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
-    fly = f"{this_command()} fly --policy {policy} {mission_flags(mission)}"
+    typed = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
+    fly = f"{this_command()} fly --policy {typed} {mission_flags(mission)}"
     plain_console().print(f"{each['description']}\n\nFly it:  {fly}")
+
+
+def _beyond_paper(each: dict[str, Any]) -> dict[str, str]:
+    """Return the row of what a policy uses beyond the paper; a stored network's has none."""
+    row, beyond = "beyond the paper", each["beyond_paper"]
+    if beyond is not None:
+        return {row: ", ".join(beyond) or "nothing"}
+    if is_own_policy(each["name"]):
+        return {row: "it does not say: give its class an `about`"}
+    return {}
 
 
 def _described(mission: Mission) -> str:

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.about import Information, Leading, Listed, Look, PairMemory, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tdma import slot_of
@@ -27,6 +28,7 @@ SENSED_BELOW_DB = 8.0  # what just decodes: two and a half times the range, in f
 SHIFTS_DB = (2.0, 0.0, -2.0, -4.0)
 MINISLOTS = 50.0  # by which twice the gain is earlier
 DRAWN_MINISLOTS = 10.0  # against ties
+SENSING_MEMORY = PairMemory(bytes_per_pair=25.0)  # the power of each robot at each other
 
 
 def sensed_dbm(mission: Mission) -> float:
@@ -76,6 +78,22 @@ class CarrierSense(RandomTransmission, SensingPolicy):
     each minislot a robot whose channel is idle begins with probability p.
     """
 
+    about = Listed(
+        name="csma",
+        origin=Textbook(source="Kleinrock and Tobagi 1975; Cali, Conti and Gregori 2000"),
+        rank=50,
+        uses="the power that it senses in the channel before it transmits",
+        beyond=(Information.RADIO_CONSTANTS, Information.CARRIER_SENSING),
+        payload=None,
+        look=Look(label="CSMA", colour="#661100", marker=">"),
+        memory=SENSING_MEMORY,
+    )
+
+    @classmethod
+    def with_probability(cls, mission: Mission, probability: float) -> "CarrierSense":
+        """Return the policy for a mission's radio."""
+        return cls(probability, sensed_dbm(mission))
+
     def __init__(self, probability: float, sensing_dbm: float) -> None:
         """Take the probability in each minislot, and the power from which a channel is busy."""
         RandomTransmission.__init__(self, probability)
@@ -97,6 +115,32 @@ class AgeGainCsma(SensingPolicy):
     learned the same. The power that counts as busy changes from slot to slot: where it is low,
     fewer robots transmit, so that packets get through weaker links.
     """
+
+    about = Listed(
+        name="age-gain-csma",
+        origin=Leading(over=("csma",)),  # which senses, too
+        rank=60,
+        uses=(
+            "the power that it senses before it transmits, T, the clock, the size of the team, and "
+            "how far away the senders that it decodes are by its buffer, in ranges"
+        ),
+        beyond=(
+            Information.CLOCK,
+            Information.TEAM_SIZE,
+            Information.OBSERVED_POSITIONS,
+            Information.RADIO_CONSTANTS,
+            Information.CARRIER_SENSING,
+            Information.DECODED_PACKETS,
+        ),
+        payload=None,
+        look=Look(label="age-gain CSMA", colour="#2244ee", marker="8"),
+        memory=SENSING_MEMORY,
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "AgeGainCsma":
+        """Return the policy for a mission's radio."""
+        return cls(mission)
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio."""

@@ -5,8 +5,10 @@ from collections.abc import Sequence
 import numpy as np
 from jaxtyping import Float, Int
 
+from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.about import FEW_BYTES, FromPaper, Listed, Look
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.window import LocalViews
@@ -19,6 +21,25 @@ class RoundRobin(CentralisedPolicy):
     TDMA around a base station (Miao et al. 2016): the robot nearest the centre, chosen anew in each
     window.
     """
+
+    about = Listed(
+        name="round-robin",
+        origin=FromPaper(section="IV-C"),
+        rank=20,
+        uses=(
+            "the true positions, identities and the clock: each robot in turn talks to a base, the "
+            "robot nearest the middle"
+        ),
+        beyond=(),
+        payload=None,
+        look=Look(label="round robin", colour="#56b4e9", marker="s"),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "RoundRobin":  # noqa: ARG003
+        """Return the policy, which is the same for every mission."""
+        return cls()
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the base, for the one robot whose turn it is."""
@@ -49,6 +70,29 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
 
     Each exchanges buffers with it with probability p.
     """
+
+    about = Listed(
+        name="mst",
+        origin=FromPaper(section="IV-C"),
+        rank=30,
+        uses=(
+            "the true positions at the start (moving teams of --preset reference: in each window): "
+            "a robot talks to its parent in their spanning tree"
+        ),
+        beyond=(),
+        payload=None,
+        look=Look(label="MST", colour="#009e73", marker="^"),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def with_probability(cls, mission: Mission, probability: float) -> "MinimumSpanningTree":
+        """Return the policy for a mission, whose preset says what becomes of the tree."""
+        return cls(
+            probability,
+            is_recomputed=mission.tree_recomputed,
+            root_transmits=mission.tree_root_transmits,
+        )
 
     def __init__(
         self, probability: float, *, is_recomputed: bool = False, root_transmits: bool = False

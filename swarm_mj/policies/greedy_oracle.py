@@ -15,6 +15,7 @@ from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.about import Bound, Information, Listed, Look, PairMemory
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, merge_expected, observe_own, rise
 from swarm_mj.protocol.window import LocalViews
@@ -30,6 +31,27 @@ class GreedyOracle(CentralisedPolicy):
     Centralised: it sees all buffers and all true positions. It addresses no robot that sends, even
     where the authors' code would let that robot hear.
     """
+
+    about = Listed(
+        name="greedy-oracle",
+        origin=Bound(),
+        rank=130,
+        uses=(
+            "T in all buffers, all true positions and the true channel except its fades, at every "
+            "moment"
+        ),
+        beyond=(Information.TRUE_POSITIONS, Information.ALL_BUFFERS, Information.TRUE_CHANNEL),
+        payload=None,
+        look=Look(
+            label="greedy oracle", colour="#000000", marker=".", marker_size=5.0, line_width=0.8
+        ),
+        memory=PairMemory(bytes_per_pair=60.0),
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "GreedyOracle":
+        """Return the policy for a mission's radio."""
+        return cls(mission)
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""

@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.policies.about import About
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, RequestResponse, WindowProtocol
@@ -18,22 +19,74 @@ Parameters = Mapping[str, bool | int | float | str]  # what a policy was made wi
 
 
 class Policy:
-    """A choice of the robot that every robot addresses next, and of the form of a window."""
+    """A choice of the robot that every robot addresses next, and of the form of a window.
 
-    is_centralised: bool = False  # whether a centre decides, or each robot by itself
-    uses: str = ""  # the information that it decides by, in a few words; ours: `uses.toml`
-    payload: str = "none"  # what packets carry beyond T, M and P (II-B), in a word
+    Subclass `DecentralisedPolicy`, `BroadcastPolicy` or `CentralisedPolicy`, not this class. All
+    that follows has a default, which a subclass may replace.
+
+    Attributes:
+        about: What the policy says of itself. A class declares its own and never inherits one, so
+            that nothing is said of a subclass that decides by other things; None is unknown.
+        is_centralised: Whether a centre decides, or each robot by itself.
+        uses: The information that it decides by, in a few words, where `about` does not say it.
+        payload: What packets carry beyond T, M and P (II-B), in a word; that of `about`, if there
+            is one.
+    """
+
+    about: About | None = None
+    is_centralised: bool = False
+    uses: str = ""
+    payload: str = "none"
+
+    def __init_subclass__(cls, **kwargs: object) -> None:
+        super().__init_subclass__(**kwargs)
+        about = vars(cls).get("about")
+        if not isinstance(about, About | None):
+            raise TypeError(f"about of {cls.__name__} must be an About, not {about!r:.80}")
+        cls.about = about
+        if about is not None:
+            cls.payload = about.payload_name
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "Policy":
+        """Return the policy for a mission, as `make_policy` does by its name.
+
+        Every policy of the package says how it is made; one of yours needs not, since the command
+        line calls what `module:Name` names.
+
+        Args:
+            mission: What is flown; its preset says how the paper's baselines behave.
+
+        Raises:
+            ValueError: If the policy cannot fly the mission.
+        """
+        raise NotImplementedError(f"{cls.__name__} does not say how a mission's is made")
 
     def window(self, mission: Mission) -> WindowProtocol:
         """Return what the robots do in a window: by Alg. 1 they request, and respond."""
         return RequestResponse(silence_is_attempt=mission.silence_is_attempt)
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:  # noqa: ARG002
-        """Return what packets carry beyond T, M and P; the mission says how wide fields must be."""
+        """Return the fields that packets have beyond T, M and P; their bytes then count.
+
+        Args:
+            mission: Its numbers say how wide the fields must be.
+
+        Returns:
+            The fields, in the order in which a packet has them; none unless the policy has a
+            payload.
+        """
         return ()
 
     def packet(self, mission: Mission) -> Packet:
-        """Return the packet, with all entries that a slot holds; ValueError if it holds none."""
+        """Return the packet of the policy in a mission, with all entries that a slot holds.
+
+        Args:
+            mission: Its team, area and bit rate say how large packets are and may be.
+
+        Raises:
+            ValueError: If a slot holds not even one entry beside the payload.
+        """
         packet = packet_of(mission, self.payload_fields(mission))
         return fitting(packet, mission, type(self).__name__)
 
@@ -43,7 +96,13 @@ class Policy:
         return {}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
-        """Prepare for new missions: N robots in each, and one generator per mission."""
+        """Prepare for new missions, which are flown side by side; forget those before.
+
+        Args:
+            num_robots: N, the robots in each mission.
+            rngs: A generator for each mission. A policy draws for mission b from the b-th only, so
+                that a mission does not depend on those beside it.
+        """
 
 
 def check_parameters(policy: Policy) -> None:
@@ -57,22 +116,50 @@ def check_parameters(policy: Policy) -> None:
 
 
 class DecentralisedPolicy(Policy, ABC):
-    """A policy that every robot evaluates on its own view (Eq. 9)."""
+    """A policy that every robot evaluates on its own view (Eq. 9).
+
+    In a window each robot requests from the robot that it addresses, which responds if it decodes
+    the request (Alg. 1).
+
+    Example:
+        >>> class AskTheStalest(DecentralisedPolicy):
+        ...     def recipients(self, views):
+        ...         return np.argmin(views.buffers.timestamp, axis=2)
+    """
 
     def inform(self, belief: Belief) -> None:
-        """Receive, before `start`, what all robots know of the channel."""
+        """Receive, before `start`, what all robots know of the channel.
+
+        Args:
+            belief: Its powers, and whatever else `--prior-knowledge` grants of it.
+        """
         self._belief = belief
 
     @abstractmethod
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Return the robot that each robot addresses; itself is silence.
+        """Return the robot that each robot addresses in the next window.
 
-        Row [b, i] may depend on view [b, i] only.
+        Args:
+            views: What each robot knows: its buffer, the clock, the last slots. Arrays are
+                read-only; b counts missions and i robots.
+
+        Returns:
+            Indices of robots: at [b, i] the one that robot i addresses, or i itself for silence.
+            Row [b, i] may depend on view [b, i] only.
         """
 
 
 class BroadcastPolicy(DecentralisedPolicy):
-    """A decentralised policy whose packets are for everyone who hears them (IV-C)."""
+    """A decentralised policy whose packets are for everyone who hears them (IV-C).
+
+    It decides before each slot, two a window, and nobody answers.
+
+    Example:
+        >>> class InTurn(BroadcastPolicy):
+        ...     def transmits(self, views):
+        ...         slot = (2 * views.now[:, None]).astype(int)
+        ...         return views.silence == slot % views.num_robots
+    """
 
     def window(self, mission: Mission) -> WindowProtocol:
         """Return what the robots do in a window: they broadcast twice, unanswered."""
@@ -83,7 +170,14 @@ class BroadcastPolicy(DecentralisedPolicy):
 
     @abstractmethod
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Return who broadcasts in the next slot; [b, i] may depend on view [b, i] only."""
+        """Return who broadcasts in the next slot.
+
+        Args:
+            views: What each robot knows, as in `DecentralisedPolicy.recipients`.
+
+        Returns:
+            True at [b, i] if robot i transmits; it may depend on view [b, i] only.
+        """
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
         """Return `BROADCAST` for robots that transmit; ValueError if `transmits` is not bools."""
@@ -119,14 +213,33 @@ def team_views(views: LocalViews) -> list[TeamView]:
 
 
 class CentralisedPolicy(Policy, ABC):
-    """A policy that knows the truth: everyone's buffer and everyone's true state."""
+    """A policy that knows the truth: everyone's buffer and everyone's true state.
+
+    Example:
+        >>> class CallTheFirst(CentralisedPolicy):
+        ...     def recipients(self, views, states):
+        ...         return np.zeros_like(views.silence)
+    """
 
     is_centralised = True  # unless the truth stands in for what each robot senses
 
     def inform(self, truth: TrueLinks) -> None:
-        """Receive, before `start`, the true links before their fades."""
+        """Receive, before `start`, the true links before their fades.
+
+        Args:
+            truth: The channel that packets take, whatever robots believe of it.
+        """
         self._truth = truth
 
     @abstractmethod
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
-        """Return each robot's recipient, by all views and true states; itself is silence."""
+        """Return the robot that each robot addresses in the next window.
+
+        Args:
+            views: What each robot knows, as in `DecentralisedPolicy.recipients`.
+            states: Where all robots truly are and how fast: `position_m` and `velocity_mps`
+                [missions, robots, 2].
+
+        Returns:
+            Indices of robots: at [b, i] the one that robot i addresses, or i itself for silence.
+        """

@@ -3,6 +3,7 @@
 Random flooding (IV-C), slotted ALOHA and innovation gossip; they differ in what the chance is of.
 """
 
+from abc import ABC, abstractmethod
 from collections.abc import Sequence
 from numbers import Real
 
@@ -12,13 +13,23 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.policies.about import FEW_BYTES, FromPaper, Information, Listed, Look, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy, Parameters, Policy
 from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, WindowProtocol
 from swarm_mj.system.compiled import compiled
 
 
-class RandomTransmission(Policy):
-    """The common base of policies whose robots draw whether they transmit."""
+class RandomTransmission(Policy, ABC):
+    """The common base of policies whose robots draw whether they transmit.
+
+    `make_policy` gives each of them the probability that was tuned for it, unless another is asked
+    for.
+    """
+
+    @classmethod
+    @abstractmethod
+    def with_probability(cls, mission: Mission, probability: float) -> Policy:
+        """Return the policy for a mission, with this probability."""
 
     def __init__(self, probability: float) -> None:
         """Take the probability in [0, 1], whose meaning is each policy's own, or ValueError."""
@@ -44,6 +55,22 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
     and is silent if it draws itself: so it transmits with p (N - 1) / N. Packets name the addressee
     only under their half-duplex rule, by which an addressed robot hears while it sends.
     """
+
+    about = Listed(
+        name="random-flooding",
+        origin=FromPaper(section="IV-C"),
+        rank=10,
+        uses="nothing: it transmits with probability p",
+        beyond=(),
+        payload=None,
+        look=Look(label="random flooding", colour="#e69f00", marker="o"),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def with_probability(cls, mission: Mission, probability: float) -> "RandomFlooding":
+        """Return the policy for a mission, by whose preset packets name an addressee or not."""
+        return cls(probability, names_addressee=mission.half_duplex == "eavesdroppers")
 
     def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
         """Take the probability of a draw in each slot, and whether packets name an addressee."""
@@ -83,6 +110,26 @@ class Aloha(RandomTransmission, BroadcastPolicy):
     stations, and `probability` is that any of them broadcasts in a slot: each does so with
     1 - (1 - p)^(1/n).
     """
+
+    about = Listed(
+        name="aloha",
+        origin=Textbook(source="Abramson 1970; Roberts 1975"),
+        rank=40,
+        uses="the size of the team, and how many robots in its buffer are in range",
+        beyond=(
+            Information.TEAM_SIZE,
+            Information.OBSERVED_POSITIONS,
+            Information.RADIO_CONSTANTS,
+        ),
+        payload=None,
+        look=Look(label="slotted ALOHA", colour="#999933", marker="v"),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def with_probability(cls, mission: Mission, probability: float) -> "Aloha":
+        """Return the policy for a mission's range."""
+        return cls(probability, range_m=mission.range_m)
 
     def __init__(self, probability: float, *, range_m: float) -> None:
         """Take the probability and the distance at which a lone transmission just decodes [m]."""
@@ -129,6 +176,22 @@ class InnovationGossip(RandomTransmission, BroadcastPolicy):
     position now and then. Two unanswered broadcasts a window lead to a lower age than one packet
     that a neighbour answers.
     """
+
+    about = Listed(
+        name="gossip",
+        origin=Textbook(source="Demers et al. 1987"),
+        rank=70,
+        uses=("how much its T has risen since its last transmission, averaged over the team"),
+        beyond=(Information.TEAM_SIZE,),
+        payload=None,
+        look=Look(label="gossip", colour="#882255", marker="P", marker_size=5.0),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def with_probability(cls, mission: Mission, probability: float) -> "InnovationGossip":  # noqa: ARG003
+        """Return the policy, which is the same for every mission."""
+        return cls(probability)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Give every robot its own numbers, and everything to tell; as `Policy.start`."""

@@ -1,74 +1,91 @@
-"""The one table of policies by their names on the command line, and `make_policy`.
+"""Policies by their names on the command line: which there are, and `make_policy`.
 
 A name is one of `POLICIES`, the file of a learned policy or its run's folder, or `module:Name` of a
-user's own. `gnn` is the learned policy that comes with the package.
+user's own. `POLICIES` are what the classes of this package declare as their `about`, and `gnn`, the
+learned policy that comes with it.
 """
 
+import inspect
 import os
-import tomllib
-from collections.abc import Callable, Iterable, Sequence
+import pkgutil
+import sys
+from collections.abc import Iterable, Iterator, Sequence
+from importlib import import_module
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.carrier_sense import AgeGainCsma, CarrierSense, sensed_dbm
-from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
-from swarm_mj.policies.greedy_oracle import GreedyOracle
-from swarm_mj.policies.planner.link_tables import link_fields
-from swarm_mj.policies.planner.policy import Planner
-from swarm_mj.policies.planner.resting import RestingPlanner
+from swarm_mj.policies.about import About, Listed
+from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
+from swarm_mj.policies.learned import LearnedPolicy
+from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
-from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
-from swarm_mj.policies.tdma import SpatialTdma, Tdma
+from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.system import needs
-from swarm_mj.system.fields import check_kind, did_you_mean
+from swarm_mj.system.fields import check_kind, did_you_mean, unwrapped
 from swarm_mj.system.packages import asset, need
-from swarm_mj.system.user_code import is_own, make
+from swarm_mj.system.user_code import is_own, load, make
 
-WITHOUT_PAYLOAD = "planner --payload none"  # packets carry T, M and P alone
 FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
 PAYLOADS = ("snapshots", "none")  # the planner's own, which at rest is links, or nothing
 
+PACKAGE = __name__.rpartition(".")[0]
+# Files and folders of trained networks, which are policies by their files, not by names; flying
+# does without the libraries that these import.
+LEARNED = ("gnn", "stored")
 
-def _planner(mission: Mission) -> Planner | RestingPlanner:
-    if mission.moves:
-        return Planner(mission)
-    return RestingPlanner(mission, learns=fits(packet_of(mission, link_fields(mission)), mission))
+
+def policy_classes() -> Iterator[type[Policy]]:
+    """Yield the classes of policies in this package, but for trained networks and common bases."""
+    folders = sys.modules[PACKAGE].__path__
+    for found in pkgutil.walk_packages(folders, f"{PACKAGE}."):
+        if found.name.removeprefix(f"{PACKAGE}.").partition(".")[0] in LEARNED:
+            continue
+        module = import_module(found.name)
+        for each in list(vars(module).values()):  # a copy, as one of the modules is this one
+            if isinstance(each, type) and each.__module__ == module.__name__ and _is_policy(each):
+                yield each
 
 
-# What makes each policy, given the mission and, for these, a transmission probability.
-HAVE_PROBABILITY = ("random-flooding", "mst", "aloha", "csma", "gossip")
-RULES: dict[str, Callable[..., Policy]] = {
-    "random-flooding": lambda mission, probability: RandomFlooding(
-        probability, names_addressee=mission.half_duplex == "eavesdroppers"
-    ),
-    "round-robin": lambda _: RoundRobin(),
-    "mst": lambda mission, probability: MinimumSpanningTree(
-        probability,
-        is_recomputed=mission.tree_recomputed,
-        root_transmits=mission.tree_root_transmits,
-    ),
-    "aloha": lambda mission, probability: Aloha(probability, range_m=mission.range_m),
-    "csma": lambda mission, probability: CarrierSense(probability, sensed_dbm(mission)),
-    "age-gain-csma": AgeGainCsma,
-    "gossip": lambda _, probability: InnovationGossip(probability),
-    "tdma": lambda _: Tdma(),
-    "spatial-tdma": SpatialTdma,
-    "sotdma": SelfOrganisedTdma,
-    "planner": _planner,
-    WITHOUT_PAYLOAD: RestingPlanner,
-    "greedy-oracle": GreedyOracle,
-}
-SHIPPED = "gnn"  # in assets/policies/
-_SAID = tomllib.loads(Path(__file__).with_name("uses.toml").read_text("utf-8"))
-USES, PAIR_BYTES = _SAID["uses"], _SAID["pair_bytes"]
-KINDS: dict[str, str] = _SAID["kinds"]  # of information beyond the paper's
-BEYOND: dict[str, list[str]] = _SAID["beyond"]
-POLICIES = (*RULES, SHIPPED)
+def _is_policy(kind: type) -> TypeGuard[type[Policy]]:
+    if not issubclass(kind, Policy) or issubclass(kind, LearnedPolicy):
+        return False
+    return kind is not Policy and not inspect.isabstract(kind)
+
+
+def by_name(classes: Iterable[type[Policy]]) -> dict[str, type[Policy]]:
+    """Return classes of policies by the names that they declare.
+
+    Raises TypeError, which names the class, for one that declares nothing, or the name or the place
+    in lists of another.
+    """
+    named: dict[str, type[Policy]] = {}
+    ranks = {SHIPPED_GNN.rank: SHIPPED_GNN.name}
+    for kind in classes:
+        where = f"class {kind.__qualname__} in {kind.__module__}"
+        about = kind.about
+        if not isinstance(about, Listed):
+            raise TypeError(f"{where} must declare what it is: about = Listed(...)")
+        if about.name in named or about.name == SHIPPED_GNN.name:
+            raise TypeError(f"{where} has the name of another policy, {about.name}")
+        if about.rank in ranks:
+            raise TypeError(f"{where} has the rank of {ranks[about.rank]}, {about.rank}")
+        named[about.name] = kind
+        ranks[about.rank] = about.name
+    return named
+
+
+CLASSES = by_name(policy_classes())
+_listed = [kind.about for kind in CLASSES.values() if isinstance(kind.about, Listed)]
+# What each policy of the package says of itself, in the order of lists.
+LISTED = {each.name: each for each in sorted([*_listed, SHIPPED_GNN], key=lambda each: each.rank)}
+POLICIES = tuple(LISTED)
+HAVE_PROBABILITY = tuple(
+    name for name in POLICIES if issubclass(CLASSES.get(name, Policy), RandomTransmission)
+)
+SHIPPED = SHIPPED_GNN.name  # in assets/policies/
 
 
 def make_policy(
@@ -82,13 +99,30 @@ def make_policy(
     """Return a policy by its name, for a mission.
 
     The mission's preset says how the baselines behave where paper and code differ, and its numbers
-    normalise what a learned policy sees. Policies of `HAVE_PROBABILITY` transmit with the one tuned
-    for the regime nearest to the mission's unless it is given. A deterministic learned policy takes
-    the most probable recipient, not a draw. `features` are own feature sets, as `module:Name`, that
-    may be imported for a learned policy.
+    normalise what a learned policy sees.
 
-    Raises ValueError if the name is unknown, no sound policy is there, or the policy takes no such
-    probability or mode, OSError if a file cannot be read, TypeError for no name or no mission.
+    Args:
+        name: One of `POLICIES`, the file of a learned policy or its run's folder, or `module:Name`
+            of your own.
+        mission: What is flown.
+        probability: Of a transmission, for the policies of `HAVE_PROBABILITY`; unless it is given,
+            the one tuned for the regime nearest to the mission's.
+        is_deterministic: Whether a learned policy takes the most probable recipient, not a draw.
+        features: Own feature sets, as `module:Name`, that may be imported for a learned policy.
+
+    Returns:
+        The policy, to be started with the mission's swarm.
+
+    Raises:
+        ValueError: If the name is unknown, no sound policy is there, or the policy takes no such
+            probability or mode.
+        OSError: If a file cannot be read.
+        TypeError: If there is no name or no mission.
+
+    Example:
+        >>> from swarm_mj import make_policy, paper
+        >>> make_policy("aloha", paper("flocking"), 0.3).parameters
+        {'probability': 0.3}
     """
     check_kind("policy", name, str, '"planner"')
     check_kind("mission", mission, Mission, 'paper("flocking")')
@@ -111,11 +145,12 @@ def make_policy(
         )
     if is_own_policy(name):
         return _own(name, mission)
-    if name not in HAVE_PROBABILITY:
-        return RULES[name](mission)
-    return RULES[name](
-        mission, tuned_probability(name, mission) if probability is None else probability
-    )
+    kind = CLASSES[name]
+    if not issubclass(kind, RandomTransmission):
+        return kind.for_mission(mission)
+    if probability is None:
+        probability = tuned_probability(name, mission)
+    return kind.with_probability(mission, probability)
 
 
 def _learned(name: str, mission: Mission, **options: Any) -> Policy:
@@ -123,8 +158,11 @@ def _learned(name: str, mission: Mission, **options: Any) -> Policy:
     need("torch" if name == SHIPPED else "safetensors", f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 
-    path = asset(f"policies/{SHIPPED}{SUFFIX}") if name == SHIPPED else Path(name)
-    return load_policy(path, mission, **options)
+    if name != SHIPPED:
+        return load_policy(Path(name), mission, **options)
+    policy = load_policy(asset(f"policies/{SHIPPED}{SUFFIX}"), mission, **options)
+    policy.about = SHIPPED_GNN
+    return policy
 
 
 def _own(name: str, mission: Mission) -> Policy:
@@ -143,19 +181,18 @@ def is_stored(name: str) -> bool:
     return name not in POLICIES and (is_path or name.endswith(SUFFIX) or is_there)
 
 
-def uses_of(name: str, policy: Policy) -> str:
-    """Return the information that a policy by this name decides by, if known, in a few words."""
-    return policy.uses or USES.get(_entry(name, policy), "")
+def about_of(name: str) -> About | None:
+    """Return what a policy by this name says of itself, or None if that is unknown.
 
-
-def beyond_paper(name: str, policy: Policy) -> list[str] | None:
-    """Return the kinds of information beyond the paper's that a policy uses; None if unknown."""
-    return BEYOND.get(_entry(name, policy))
-
-
-def _entry(name: str, policy: Policy) -> str:
-    payload = "" if policy.payload == "none" else f", {policy.payload}"
-    return name.partition(" ")[0] + payload
+    A user's own is not imported for it, since its name may stand in a file: it is known where this
+    process has loaded it.
+    """
+    if name in LISTED or not is_own_policy(name):
+        return LISTED.get(name)
+    module, _, attribute = name.partition(":")
+    found = getattr(sys.modules.get(module), attribute, None)
+    about = getattr(unwrapped(found), "about", None)
+    return about if isinstance(about, About) else None
 
 
 def is_learned(name: str) -> bool:
@@ -164,13 +201,17 @@ def is_learned(name: str) -> bool:
 
 
 def missions_memory(name: str, mission: Mission, num_missions: int = 1) -> float:
-    """Return the memory of missions side by side that a policy flies [bytes]."""
-    num_robots, policy_pair = mission.num_robots, 0.0
-    rounds, pair, robot = PAIR_BYTES.get(name.partition(" ")[0], (0.0, 0.0, 0.0))
-    if mission.num_windows > rounds * num_robots:
-        policy_pair = pair + robot * num_robots * mission.moves
+    """Return the memory of missions side by side that a policy flies [bytes].
+
+    What a policy takes itself counts if it says so. Raises ValueError if a user's own cannot be
+    imported.
+    """
+    if is_own_policy(name):
+        load("policy", name)
+    about = about_of(name)
+    policy_pair = 0.0 if about is None else about.memory.of(mission)
     learned = is_learned(name)
-    return needs.missions_memory(num_robots, num_missions, policy_pair, is_learned=learned)
+    return needs.missions_memory(mission.num_robots, num_missions, policy_pair, is_learned=learned)
 
 
 def is_own_policy(name: str) -> bool:

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.policies.about import FEW_BYTES, Information, Listed, Look, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
@@ -35,6 +36,25 @@ class Tdma(BroadcastPolicy):
     mission and, like the identities, granted to all of its robots beforehand (II-C).
     """
 
+    about = Listed(
+        name="tdma",
+        origin=Textbook(source="Miao, Zander, Sung and Slimane 2016"),
+        rank=80,
+        uses=(
+            "its identity, the size of the team, a common random order and the clock: one robot "
+            "transmits per slot"
+        ),
+        beyond=(Information.COMMON_ORDER, Information.CLOCK, Information.TEAM_SIZE),
+        payload=None,
+        look=Look(label="TDMA", colour="#0072b2", marker="D", marker_size=4.0),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "Tdma":  # noqa: ARG003
+        """Return the policy, which is the same for every mission."""
+        return cls()
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order; arguments as in `Policy.start`."""
         self._order = draw_order(num_robots, rngs)
@@ -55,6 +75,36 @@ class SpatialTdma(Tdma):
     Large teams' rounds are too long for that: there such robots also send where they win by node
     activation. There is one difference: common random numbers are weighted by a robot's news.
     """
+
+    about = Listed(
+        name="spatial-tdma",
+        origin=Textbook(source="Nelson and Kleinrock 1985; Grönkvist and Hansson 2001"),
+        rank=90,
+        uses=(
+            "as tdma, and the positions in its buffer and its prior knowledge of the radio: robots "
+            "far apart share a slot; in large teams also T, the senders that it decodes, the area "
+            "and common random numbers: robots with much news transmit"
+        ),
+        beyond=(
+            Information.COMMON_ORDER,
+            Information.CLOCK,
+            Information.TEAM_SIZE,
+            Information.OBSERVED_POSITIONS,
+            Information.RADIO_CONSTANTS,
+            Information.COMMON_RANDOM_NUMBERS,  # in large teams alone
+            Information.DECODED_PACKETS,  # likewise
+            Information.AREA,
+            Information.PRIOR_KNOWLEDGE,
+        ),
+        payload=None,
+        look=Look(label="spatial TDMA", colour="#332288", marker="h", marker_size=5.5),
+        memory=FEW_BYTES,
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "SpatialTdma":
+        """Return the policy for a mission's radio."""
+        return cls(mission)
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""

@@ -96,6 +96,59 @@ def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
     assert "nobody" in capsys.readouterr().err
 
 
+OWN = """
+from swarm_mj import BroadcastPolicy
+from swarm_mj.policies import FEW_BYTES, About, Information, Look, Payload
+from swarm_mj.protocol.packets import PacketField
+
+class Quiet(BroadcastPolicy):
+    '''Robots say little.'''
+
+    uses = "hardly anything"
+    payload = "a word"
+
+    def transmits(self, views):
+        return views.silence == 0
+
+class Whole(Quiet):
+    '''Robots say it all.'''
+
+    about = About(
+        uses="the clock alone",
+        beyond=(Information.CLOCK, Information.AREA),
+        payload=Payload(name="charge", meaning="how full each battery is"),
+        look=Look(label="by charge", colour="#117733", marker="x"),
+        memory=FEW_BYTES,
+    )
+
+    def payload_fields(self, mission):
+        return (PacketField(name="charge", bits=8),)
+
+class Mute(BroadcastPolicy):
+    def transmits(self, views):
+        return views.silence < 0
+"""
+
+
+def test_a_users_own_policy_says_of_itself_what_it_declares(capsys, here, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "200")
+    (here / "own_of_this_test.py").write_text(OWN)
+    shown = printed(capsys, "own_of_this_test:Whole")
+    assert re.search(r"what it uses\W+the clock alone\W", shown)
+    assert re.search(r"beyond the paper\W+clock, area\W", shown)
+    assert "charge: how full each battery is" in shown
+    assert "368 bytes" in shown
+    shown = printed(capsys, "own_of_this_test:Quiet")
+    assert re.search(r"what it uses\W+hardly anything\W", shown)
+    assert re.search(r"beyond the paper\W+it does not say: give its class an `about`", shown)
+    assert "a word" in shown
+    assert "it does not say: give its class a text `uses`" in printed(
+        capsys, "own_of_this_test:Mute"
+    )
+    said = json.loads(printed(capsys, "own_of_this_test:Mute", "--json"))
+    assert (said["uses"], said["beyond_paper"], said["payload"]) == ("", None, "none")
+
+
 def test_the_readme_says_what_packets_carry():
     for row in table_rows("README.md"):
         carried = next(cell for head, cell in row.items() if head.startswith("packets carry"))

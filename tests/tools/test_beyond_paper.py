@@ -10,7 +10,9 @@ import pytest
 
 from swarm_mj.cli import main
 from swarm_mj.mission import paper
-from swarm_mj.policies.registry import BEYOND, KINDS, POLICIES, make_policy
+from swarm_mj.policies.about import Information
+from swarm_mj.policies.planner.resting import WITH_LINKS
+from swarm_mj.policies.registry import LISTED, POLICIES, make_policy
 from swarm_mj.simulation.swarm import Swarm
 
 PAGE = Path(__file__).parents[2] / "docs" / "results.md"
@@ -60,13 +62,16 @@ def test_the_table_says_what_the_command_line_says(table, capsys):
 
 
 def test_every_kind_is_explained_and_used():
-    assert set().union(*BEYOND.values()) == set(KINDS)
-    assert all(text.endswith(".") for text in KINDS.values())
+    used = {kind for about in LISTED.values() for kind in about.beyond}
+    assert used == set(Information)
+    assert all(kind.sentence.endswith(".") for kind in Information)
+    assert len({kind.label for kind in Information}) == len(Information)
 
 
 def test_without_a_payload_moving_teams_use_what_spatial_tdma_does(capsys):
     assert main(["policies", "planner --payload none", "--json"]) == 0
-    assert json.loads(capsys.readouterr().out)["beyond_paper"] == BEYOND["spatial-tdma"]
+    listed = json.loads(capsys.readouterr().out)["beyond_paper"]
+    assert listed == [kind.label for kind in LISTED["spatial-tdma"].beyond]
 
 
 def timestamps(name, noise_m):
@@ -82,6 +87,6 @@ def timestamps(name, noise_m):
 @pytest.mark.parametrize("name", POLICIES)
 def test_errors_of_positions_reach_the_policies_that_use_them(name):
     """At 200 m (the range is 250 m) they change who transmits, or do not reach the policy."""
-    entry = {"planner": "planner, links", "planner --payload none": "planner"}.get(name, name)
+    about = WITH_LINKS if name == "planner" else LISTED[name]
     changes = not np.array_equal(timestamps(name, 0.0), timestamps(name, 200.0))
-    assert changes == ("positions as observed" in BEYOND[entry])
+    assert changes == (Information.OBSERVED_POSITIONS in about.beyond)

@@ -107,12 +107,12 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
         "label": name_of(curve) + (", published" if is_published else ""),
         "color": look.colour,
         "linestyle": "--" if is_published else "-",
-        "linewidth": look.width,
+        "linewidth": look.line_width,
     }
     if not curve.is_level:
         marker = {
             "marker": look.marker,
-            "markersize": RING * look.size if is_published else look.size,
+            "markersize": RING * look.marker_size if is_published else look.marker_size,
             "markerfacecolor": "white" if is_published else look.colour,
         }
         bars = {"yerr": curve.sem, "elinewidth": 0.9, "capsize": 2.0}

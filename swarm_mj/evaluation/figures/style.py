@@ -7,14 +7,16 @@ oracle, which no team could fly, is black and thin.
 
 import io
 from contextlib import AbstractContextManager
+from dataclasses import replace
 from pathlib import Path
-from typing import NamedTuple, cast
+from typing import cast
 
 import matplotlib.style
-import msgspec
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
+from swarm_mj.policies.about import Look
+from swarm_mj.policies.registry import LISTED, about_of
 from swarm_mj.system.writing import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
@@ -30,24 +32,48 @@ SHORT = 7  # of a commit's digits
 CAPTION = "caption"  # the name of the text that files also have among their own descriptions
 
 
-class Look(NamedTuple):
-    """How a method looks in every figure."""
-
-    label: str
-    colour: str
-    marker: str
-    size: float = 4.5  # of the marker [pt]
-    width: float = 1.4  # of the line [pt]
-
-
-LOOKS = msgspec.toml.decode(
-    Path(__file__).with_name("looks.toml").read_bytes(), type=dict[str, Look]
-)
+# The GNN and its variants, of which no figure shows all: some look like others of other figures.
+GNN = Look(label="GNN", colour="#cc79a7", marker="X")
+VARIANT = Look(label="GNN, linear", colour="#5e16d8", marker="p")
+REWARDED = Look(label="GNN, shared reward", colour="#180048", marker="H")
+# What is no policy of the package, by its name in results and published tables.
+OTHERS = {
+    "training.ceiling:Annealed": Look(
+        label="searched schedule", colour="#0000ff", marker=".", marker_size=5.0, line_width=0.8
+    ),
+    "floor": Look(
+        label="proven floor", colour="#cccccc", marker="_", marker_size=6.0, line_width=2.5
+    ),
+    "GNN": GNN,
+    "linear GNN": VARIANT,
+    "GNN generalized from 0.25": replace(VARIANT, label="GNN, from 0.25"),
+    "GNN trained at each size": replace(GNN, label="GNN, each size"),
+    "GNN generalized from 40": replace(VARIANT, label="GNN, from 40"),
+    BETTER: replace(GNN, label="the paper's GNN"),
+    "GNN with shared reward": REWARDED,
+    "GNN with credit per robot": replace(REWARDED, label="GNN, own credit"),
+    "GNN trained on AoI": replace(GNN, label="GNN, on AoI"),
+    "GNN trained on velocity variance": replace(VARIANT, label="GNN, on variance"),
+}
+LOOKS = {name: about.look for name, about in LISTED.items()} | OTHERS
 
 
 def look_of(method: str) -> Look:
-    """Return the look of a policy or a published method; one without a look is grey."""
-    return LOOKS.get(method, Look(escape_mathtext(method), FAINT, "d"))
+    """Return how a method looks in every figure.
+
+    Args:
+        method: A policy's name, or a published method's. That of a policy of a user's own counts
+            where this process has loaded it, and it declares a look.
+
+    Returns:
+        The look; a method that declares none is grey, under its name.
+    """
+    if method in LOOKS:
+        return LOOKS[method]
+    about = about_of(method)
+    if about is None:
+        return Look(label=escape_mathtext(method), colour=FAINT, marker="d")
+    return replace(about.look, label=escape_mathtext(about.look.label))
 
 
 def escape_mathtext(text: str) -> str:

@@ -26,22 +26,74 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.policies.about import (
+    Information,
+    Leading,
+    Listed,
+    Look,
+    PairMemory,
+    Payload,
+)
 from swarm_mj.policies.planner.discovery import Discovery
+from swarm_mj.policies.planner.link_tables import link_fields
 from swarm_mj.policies.planner.plan import Plan, epoch_plan
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, snapshot_fields, take_snapshots
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.packets import PacketField, check_fits, packet_of
+from swarm_mj.protocol.packets import PacketField, check_fits, fits, packet_of
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
+
+PLANNER_LOOK = Look(label="planner", colour="#80391e", marker="d")  # moving or at rest
+# A plan by each of the snapshots that are still flown by, of which moving teams have many.
+PLANS_MEMORY = PairMemory(bytes_per_pair=250.0, from_round=1.0, moving_bytes_per_robot=4.0)
 
 
 class Planner(BroadcastPolicy):
     """All robots make one plan, from shared snapshots."""
 
-    payload = "snapshots"  # two, taken earlier
+    about = Listed(
+        name="planner",
+        origin=Leading(over=("spatial-tdma", "sotdma", "gnn")),
+        rank=110,
+        uses=(
+            "its buffer, the senders that it decodes, the clock, common orders, the size of the "
+            "team, the area, its prior knowledge of the radio and of errors of positions; and "
+            "snapshots of the team in packets"
+        ),
+        beyond=(
+            Information.COMMON_ORDER,
+            Information.CLOCK,
+            Information.TEAM_SIZE,
+            Information.OBSERVED_POSITIONS,
+            Information.RADIO_CONSTANTS,
+            Information.DECODED_PACKETS,
+            Information.AREA,
+            Information.PRIOR_KNOWLEDGE,
+            Information.POSITION_ERRORS,
+        ),
+        payload=Payload(
+            name="snapshots",
+            meaning="two pictures of the whole team, on which robots agree to plan alike",
+        ),
+        look=PLANNER_LOOK,
+        memory=PLANS_MEMORY,
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> BroadcastPolicy:
+        """Return the planner of a team that moves, or of one at rest.
+
+        At rest, packets carry what robots learn of links wherever a slot holds that.
+        """
+        if mission.moves:
+            return cls(mission)
+        from swarm_mj.policies.planner.resting import RestingPlanner  # which knows this one
+
+        packet = packet_of(mission, link_fields(mission))
+        return RestingPlanner(mission, learns=fits(packet, mission))
 
     def __init__(self, mission: Mission, settings: PlannerSettings | None = None) -> None:
         """Prepare the policy for the mission's team, in free space unless it is informed otherwise.

@@ -27,9 +27,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.policies.about import About, Information, Listed, Look, Payload, VariantOf
 from swarm_mj.policies.planner import link_tables
 from swarm_mj.policies.planner.plan import Plan
-from swarm_mj.policies.planner.policy import Planner
+from swarm_mj.policies.planner.policy import PLANNER_LOOK, PLANS_MEMORY, Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
@@ -41,7 +42,39 @@ from swarm_mj.radio.links import Links
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.system.decibels import from_db
 
+WITHOUT_PAYLOAD = "planner --payload none"  # the option makes it a policy of its own
 NOT_YET = np.iinfo(np.int64).max
+# Of what either kind of packets leads to.
+BEYOND = (
+    Information.COMMON_ORDER,
+    Information.CLOCK,
+    Information.TEAM_SIZE,
+    Information.OBSERVED_POSITIONS,
+    Information.RADIO_CONSTANTS,
+    # Of spatial TDMA in large teams, and where positions have errors.
+    Information.COMMON_RANDOM_NUMBERS,
+    Information.DECODED_PACKETS,
+    Information.AREA,
+    Information.PRIOR_KNOWLEDGE,
+    Information.POSITION_ERRORS,
+)
+# Of `planner` at rest, whose robots know and send other things than those that move.
+WITH_LINKS = About(
+    uses=(
+        "its buffer, the senders that it decodes, the clock, common orders, the size of the team, "
+        "the area, its prior knowledge of the radio and of errors of positions; and all robots' "
+        "observations of their links, in packets"
+    ),
+    beyond=BEYOND,
+    payload=Payload(
+        name="links",
+        meaning=(
+            "how often robots decoded and missed each other, and what that says of the channel"
+        ),
+    ),
+    look=PLANNER_LOOK,
+    memory=PLANS_MEMORY,
+)
 
 
 class RestingPlanner(BroadcastPolicy):
@@ -49,6 +82,25 @@ class RestingPlanner(BroadcastPolicy):
 
     Until then they take turns.
     """
+
+    about = Listed(
+        name=WITHOUT_PAYLOAD,
+        origin=VariantOf(policy="planner"),
+        rank=120,
+        uses=(
+            "as planner, without a payload: stationary robots agree from the positions in their "
+            "buffers, the clock and their prior knowledge alone; moving teams fly spatial-tdma"
+        ),
+        beyond=BEYOND,
+        payload=None,
+        look=Look(label="planner, no payload", colour="#a6d854", marker="<"),
+        memory=PLANS_MEMORY,
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "RestingPlanner":
+        """Return the planner of a team at rest, whose packets carry nothing beyond T, M and P."""
+        return cls(mission)
 
     def __init__(
         self, mission: Mission, settings: PlannerSettings | None = None, *, learns: bool = False
@@ -63,7 +115,9 @@ class RestingPlanner(BroadcastPolicy):
         self._turns = SpatialTdma(mission)
         is_ready = learns and fits(packet_of(mission, snapshot_fields(mission)), mission)
         self._moving = Planner(mission) if is_ready else None
-        self.payload = "links" if learns else "none"  # what robots observed of links, or nothing
+        if learns:
+            self.about = WITH_LINKS
+            self.payload = WITH_LINKS.payload_name
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
         """Return those of observed links; arguments as in `Policy.payload_fields`."""

@@ -20,6 +20,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
+from swarm_mj.policies.about import Information, Listed, Look, PairMemory, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.sotdma import slot_table
 from swarm_mj.policies.sotdma.frame import Rule, choices_before, chosen, first_slots, frame_slots
@@ -38,6 +39,39 @@ class SelfOrganisedTdma(BroadcastPolicy):
 
     Of what the mission grants of the channel it uses the mean powers.
     """
+
+    about = Listed(
+        name="sotdma",
+        origin=Textbook(source="ITU-R M.1371, of 1998"),
+        rank=100,
+        uses=(
+            "as spatial-tdma at first; then its buffer, T and P in the packets that it decodes, a "
+            "common random order, the clock, the size of the team and its prior knowledge of the "
+            "radio: robots own slots, announced implicitly by transmitting, and choose the slot "
+            "that keeps the information freshest"
+        ),
+        # It begins as spatial-tdma, of which it has common random numbers and the area.
+        beyond=(
+            Information.COMMON_ORDER,
+            Information.CLOCK,
+            Information.TEAM_SIZE,
+            Information.OBSERVED_POSITIONS,
+            Information.RADIO_CONSTANTS,
+            Information.COMMON_RANDOM_NUMBERS,
+            Information.ACKNOWLEDGEMENTS,
+            Information.DECODED_PACKETS,
+            Information.AREA,
+            Information.PRIOR_KNOWLEDGE,
+        ),
+        payload=None,
+        look=Look(label="sotdma", colour="#666666", marker="d"),
+        memory=PairMemory(bytes_per_pair=230.0, from_round=1.5),  # tables of slots, once it has any
+    )
+
+    @classmethod
+    def for_mission(cls, mission: Mission) -> "SelfOrganisedTdma":
+        """Return the policy for a mission's radio."""
+        return cls(mission)
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""

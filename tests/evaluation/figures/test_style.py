@@ -1,7 +1,9 @@
 """Looks differ from each other for every eye; files are whole, valid and the same every time."""
 
 import os
+import sys
 from itertools import combinations
+from types import ModuleType
 from xml.etree import ElementTree
 
 import matplotlib as mpl
@@ -13,9 +15,11 @@ from synthetic import everything
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.drawing import draw
-from swarm_mj.evaluation.figures.style import LOOKS, code, save, styled
-from swarm_mj.evaluation.published import FORMATS, RESULT_FIGURES
-from swarm_mj.policies.registry import POLICIES
+from swarm_mj.evaluation.figures.style import FAINT, LOOKS, code, look_of, save, styled
+from swarm_mj.evaluation.published import FORMATS, RESULT_FIGURES, points
+from swarm_mj.policies.about import FEW_BYTES, About, Look
+from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.policies.registry import LISTED, POLICIES
 
 # Linear RGB as it is seen without red or green cones (Viénot, Brettel, Mollon 1999).
 BLINDNESS = {
@@ -26,10 +30,39 @@ BLINDNESS = {
 ALIKE = ("GNN t", "GNN g", "linear GNN", "GNN with shared")
 
 
+# It is grey, as what has no look is, so that it stands back in the figures that have room for it.
+GREY = "sotdma"
+
+
 def test_every_policy_has_its_own_look():
-    ours = [LOOKS[name] for name in POLICIES if name != "sotdma"]
+    assert [LOOKS[name] for name in POLICIES] == [about.look for about in LISTED.values()]
+    assert LOOKS[GREY] == Look(label=GREY, colour=FAINT, marker="d")
+    ours = [LOOKS[name] for name in POLICIES if name != GREY]
     for part in ("label", "colour", "marker"):
         assert len({getattr(look, part) for look in ours}) == len(ours)
+
+
+def test_every_published_method_has_a_look():
+    assert {row.method for row in points()} <= set(LOOKS)
+
+
+class Mine(CentralisedPolicy):
+    about = About(
+        uses="all",
+        beyond=(),
+        payload=None,
+        look=Look(label="for 5 $", colour="#117733", marker="x"),
+        memory=FEW_BYTES,
+    )
+
+
+def test_a_users_own_policy_has_the_look_that_it_declares(monkeypatch):
+    module = ModuleType("mine_of_these_figures")
+    module.Mine = Mine
+    monkeypatch.setitem(sys.modules, module.__name__, module)
+    look = look_of("mine_of_these_figures:Mine")
+    assert look == Look(label=r"for 5 \$", colour="#117733", marker="x")
+    assert look_of("elsewhere:Mine") == Look(label="elsewhere:Mine", colour=FAINT, marker="d")
 
 
 @pytest.mark.parametrize("kind", BLINDNESS)
@@ -37,7 +70,7 @@ def test_colours_stay_apart_for_colour_blind_eyes(kind):
     seen = {
         name: np.clip(np.array(BLINDNESS[kind]) @ np.power(to_rgb(look.colour), 2.2), 0, 1) ** 0.45
         for name, look in LOOKS.items()
-        if not name.startswith(ALIKE)
+        if name != GREY and not name.startswith(ALIKE)
     }
     for (one, a), (other, b) in combinations(seen.items(), 2):
         assert np.linalg.norm(a - b) > 0.14, (one, other)

@@ -1,0 +1,28 @@
+"""The learned policy that comes with the package, `gnn`: what it says of itself.
+
+It is a stored `GnnPolicy` like those that users train, so its class cannot say it; its features and
+weights are those of the file in `assets/policies/`.
+"""
+
+from swarm_mj.policies.about import FEW_BYTES, FromPaper, Information, Listed, Look
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
+
+SHIPPED_GNN = Listed(
+    name="gnn",
+    origin=FromPaper(section="III"),
+    rank=140,
+    uses=f"{ExtendedFeatures.uses}, by a trained graph neural network",
+    beyond=(
+        Information.COMMON_ORDER,
+        Information.CLOCK,
+        Information.TEAM_SIZE,
+        Information.OBSERVED_POSITIONS,
+        Information.RADIO_CONSTANTS,
+        # A feature, the news to a neighbour, counts what that neighbour's T lacks.
+        Information.ACKNOWLEDGEMENTS,
+        Information.DECODED_PACKETS,
+    ),
+    payload=None,
+    look=Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", marker_size=8.0),
+    memory=FEW_BYTES,  # beside what `needs.missions_memory` counts for every learned policy
+)
