@@ -1,4 +1,4 @@
-"""Means over the edges that end at each node, in one compiled pass (Eqs. 11, 12)."""
+"""Means over the edges that end at each node, in one compiled pass, for `gnn.fast.OneBlock`."""
 
 from typing import Any, NamedTuple
 
@@ -31,10 +31,14 @@ def edges_to(
 ) -> WantedEdges:
     """Return the edges between nodes and parents, in each direction; a parent of -1 is none."""
     num_graphs, num_nodes = parent.shape
-    max_edges, num, num_wanted = parent.size * len(is_upward), 0, 0
-    end, start = np.empty(max_edges, np.int64), np.empty(max_edges, np.int64)
-    direction, place = np.empty(max_edges, np.int64), np.empty(num_nodes, np.int64)
+    max_edges = parent.size * len(is_upward)
+    end = np.empty(max_edges, np.int64)
+    start = np.empty(max_edges, np.int64)
+    direction = np.empty(max_edges, np.int64)
     degree = np.zeros(is_wanted.sum(), np.int64)
+    place = np.empty(num_nodes, np.int64)  # of a graph's nodes, among all that are wanted
+    num = 0  # edges
+    num_wanted = 0
     for r in range(num_graphs):
         for k in range(num_nodes):
             place[k] = num_wanted if is_wanted[r, k] else -1
@@ -44,7 +48,8 @@ def edges_to(
             for d in range(len(is_upward) if above >= 0 else 0):
                 to, other = (above, child) if is_upward[d] else (child, above)
                 if place[to] >= 0:
-                    end[num], start[num] = place[to], r * num_nodes + other
+                    end[num] = place[to]
+                    start[num] = r * num_nodes + other
                     direction[num] = d
                     degree[place[to]] += 1
                     num += 1
@@ -69,7 +74,8 @@ class EdgeMeans(torch.autograd.Function):
         total = torch.zeros_like(receiver)
         _sum(as_array(receiver), as_array(sender), as_array(direction), edges, total.numpy())
         ctx.save_for_backward(receiver, sender, direction)
-        ctx.edges, degree = edges, torch.from_numpy(edges.degree).clamp(min=1)
+        ctx.edges = edges
+        degree = torch.from_numpy(edges.degree).clamp(min=1)
         ctx.share = degree.to(total.dtype).reciprocal()[:, None]  # of an edge in its end's mean
         return total.mul_(ctx.share)
 

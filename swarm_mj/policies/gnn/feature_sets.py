@@ -26,8 +26,19 @@ _own: dict[str, type[FeatureExtractor]] = {}
 def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
     """Return an extractor by the name of its feature set; it is to be started.
 
-    The mission's area, duration and range normalise the features. Raises ValueError for an unknown
-    name, and for a user's own that was not loaded by `load_features`.
+    Args:
+        features: One of `FEATURE_SETS`, or a user's own, `module:Name`, after `load_features`.
+        mission: Its area, duration and range normalise the features.
+
+    Returns:
+        The extractor.
+
+    Raises:
+        ValueError: The name is unknown, or a user's own that was not loaded.
+
+    Example:
+        >>> extractor = make_extractor("extended", paper("stationary"))
+        >>> extractor.start(num_missions=1, num_robots=40)
     """
     return _feature_set(features)(mission)
 

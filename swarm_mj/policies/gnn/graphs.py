@@ -21,7 +21,17 @@ REFERENCE_WINDOWS = 500.0  # what the authors' code divides times by, whatever t
 
 @dataclass(frozen=True, kw_only=True)
 class Graphs:
-    """The graphs of R robots, each with a node for every robot of its team (III-A)."""
+    """The graphs of R robots, each with a node for every robot of its team (III-A).
+
+    Row `b N + i` is what robot i of mission b sees, and may follow from that robot's view only.
+
+    Args:
+        node: F numbers for each teammate, in the order of the extractor's `names`.
+        parent: The node that its state came over first, or -1; it makes the edges.
+        may_address: Recipients to choose among. Oneself, which is silence, must be one.
+        has_turn: Whether a common order lets the robot speak now; if not, a policy adds its
+            `silence_logit` to silence.
+    """
 
     node: Float32[np.ndarray, "R N F"]  # V: features, normalised
     parent: Int[np.ndarray, "R N"]  # P: the node that k's state came over first, or NO_PARENT
@@ -30,7 +40,25 @@ class Graphs:
 
 
 class FeatureExtractor(ABC):
-    """A maker of graphs of local views; one that remembers packets must see every window."""
+    """A maker of graphs of local views; one that remembers packets must see every window.
+
+    Policies and trainings take a subclass of yours as `--features module:Name`. Their files keep
+    the names, in order: a network flies only with the features that it was trained on.
+
+    Example:
+        >>> class Ages(FeatureExtractor):
+        ...     names = ("age",)
+        ...
+        ...     def graphs(self, views):
+        ...         age = views.now[:, None, None] - views.buffers.timestamp
+        ...         node = age.reshape(-1, views.num_robots, 1).astype(np.float32)
+        ...         return Graphs(
+        ...             node=node,
+        ...             parent=views.buffers.parent.reshape(node.shape[:2]),
+        ...             may_address=np.ones(node.shape[:2], dtype=bool),
+        ...             has_turn=np.zeros(len(node), dtype=bool),
+        ...         )
+    """
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
     uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words
@@ -40,11 +68,23 @@ class FeatureExtractor(ABC):
         self._mission = mission
 
     def start(self, num_missions: int, num_robots: int) -> None:  # noqa: B027 - most remember none
-        """Forget earlier missions, if it remembers any; now there are B of N robots."""
+        """Forget earlier missions, if it remembers any.
+
+        Args:
+            num_missions: Missions that now begin side by side, B.
+            num_robots: Robots in each of them, N.
+        """
 
     @abstractmethod
     def graphs(self, views: LocalViews) -> Graphs:
-        """Return what every robot's network sees now, row [b N + i] from view [b, i] only."""
+        """Return what every robot's network sees now.
+
+        Args:
+            views: The buffers of all robots, the time [windows] and what was just heard.
+
+        Returns:
+            A graph for each robot: row `b N + i` from view `[b, i]` only.
+        """
 
 
 def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> None:

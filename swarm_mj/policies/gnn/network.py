@@ -1,6 +1,9 @@
 """The Aggregation GNN (III-A, Eqs. 11-14): nodes and their parents in, numbers for each node out.
 
-This is the definition. `gnn.fast` computes the same numbers in fewer steps.
+This is the definition: `edges_of` makes the graph, `gn_block` is Eq. 11, `mean_aggregation` Eq. 12,
+`Core` holds the perceptrons of Eq. 13, and `AggregationGnn` is Eq. 14. Nothing else needs to be
+read to know what a network computes. `gnn.fast` computes the same numbers in fewer steps, and says
+in one place, `FastAggregationGnn.form`, which networks it does so for.
 """
 
 import itertools
@@ -28,12 +31,18 @@ def edges_of(parent: Int[Tensor, "R N"], edges: Edges, dtype: torch.dtype) -> Ed
     """Return the edges between children and parents; a node whose parent is -1 has none."""
     graph, child = (parent >= 0).nonzero(as_tuple=True)
     first = graph * parent.shape[1]
-    below, above = first + child, first + parent[graph, child]
+    below = first + child
+    above = first + parent[graph, child]
     zero = torch.zeros(len(child), 1, dtype=dtype, device=parent.device)
-    if edges == "both":
-        ends = torch.cat([above, below]), torch.cat([below, above])
-        return EdgeSet(*ends, torch.cat([zero, zero + 1]))
-    return EdgeSet(above, below, zero) if edges == "paper" else EdgeSet(below, above, zero)
+    if edges == "paper":
+        return EdgeSet(receiver=above, sender=below, feature=zero)
+    if edges == "reference":
+        return EdgeSet(receiver=below, sender=above, feature=zero)
+    return EdgeSet(
+        receiver=torch.cat([above, below]),
+        sender=torch.cat([below, above]),
+        feature=torch.cat([zero, zero + 1]),
+    )
 
 
 class Perceptron(nn.ModuleList):
@@ -85,9 +94,12 @@ def gn_block(
     Without a core, in the linear variant, edges copy their senders, so that GN(v) = A v.
     """
     sender = node[edges.sender]
-    edge = core.edge(torch.cat([edge, node[edges.receiver], sender], dim=1)) if core else sender
+    if core is None:
+        return mean_aggregation(sender, edges.receiver, len(node)), sender
+    edge = core.edge(torch.cat([edge, node[edges.receiver], sender], dim=1))
     mean = mean_aggregation(edge, edges.receiver, len(node))
-    return core.node(torch.cat([mean, node], dim=1)) if core else mean, edge
+    node = core.node(torch.cat([mean, node], dim=1))
+    return node, edge
 
 
 class AggregationGnn(nn.Module):
@@ -96,7 +108,8 @@ class AggregationGnn(nn.Module):
     def __init__(self, shape: GnnShape) -> None:
         """Draw the parameters from PyTorch's own generator."""
         super().__init__()
-        self.shape, width = shape, shape.latent
+        self.shape = shape
+        width = shape.latent
         self.encoder = Perceptrons(Perceptron(shape.num_features, shape))
         self.core: Core | None = None
         if shape.has_core:
@@ -129,12 +142,14 @@ class AggregationGnn(nn.Module):
 
     def check(self, node: Tensor, parent: Tensor) -> None:
         """Raise ValueError on graphs that would give numbers without a meaning."""
-        made_for, given, num_nodes = self.shape.num_features, node.shape[-1], parent.shape[-1]
+        made_for = self.shape.num_features
+        given = node.shape[-1]
         if given != made_for:
             raise ValueError(
                 f"nodes must have the {made_for} features that the network was made for, "
                 f"not {given}"
             )
+        num_nodes = parent.shape[-1]
         if parent.numel() and (highest := int(parent.max())) >= num_nodes:
             raise ValueError(
                 f"a parent must be one of its graph's nodes, 0 to {num_nodes - 1}, or -1 for "

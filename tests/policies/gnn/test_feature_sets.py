@@ -51,10 +51,11 @@ def test_the_sets_are_what_policies_of_1_0_were_trained_on(features):
     Two features that change places are named, with the file they stand in.
     """
     file = Path(inspect.getfile(FEATURE_SETS[features])).name
-    now, then = FEATURE_SETS[features].names, FEATURES_OF_1_0[features]
-    changed = [(k, was, has) for k, (was, has) in enumerate(zip(then, now)) if was != has]  # noqa: B905
-    assert changed == [], f"{file}: features of {features} at other places (place, was, is)"
-    assert len(now) == len(then), f"{file}: {features} has another number of features"
+    now = FEATURE_SETS[features].names
+    then = FEATURES_OF_1_0[features]
+    for number, (is_now, was) in enumerate(zip(now, then, strict=False), start=1):
+        assert is_now == was, f"{file}: number {number} of the {features} features"
+    assert len(now) == len(then), f"{file}: another number of {features} features"
 
 
 def test_the_record_of_1_0_is_as_it_was():
