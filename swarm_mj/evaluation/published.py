@@ -14,7 +14,7 @@ import math
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
-from typing import Literal, NamedTuple
+from typing import Literal, NamedTuple, TypeAlias
 
 import msgspec
 
@@ -24,12 +24,15 @@ from swarm_mj.system.reading import read_rows
 BASELINES = ("random-flooding", "round-robin", "mst")  # the paper's three
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
 FORMATS = ("svg", "png", "pdf")
-OPTIONS = {
+Scale: TypeAlias = Literal["linear", "log"]
+Cost: TypeAlias = Literal["aoi", "velocity_variance"]  # as results and published points name it
+MissionField: TypeAlias = Literal["num_robots", "range_ratio", "velocity_ratio"]
+# The fields that figures sweep, by the command line's options.
+OPTIONS: dict[MissionField, str] = {
     "num_robots": "--robots",
     "range_ratio": "--range-ratio",
     "velocity_ratio": "--velocity-ratio",
 }
-Scale = Literal["linear", "log"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,7 +43,7 @@ class Point:
     method: str  # one of `BASELINES`, or a learned one as the figure names it
     x_name: str  # receptive_field, range_ratio, num_robots or velocity_ratio
     x: float
-    cost: str  # aoi [windows] or velocity_variance [m²/s²]
+    cost: Cost  # aoi [windows] or velocity_variance [m²/s²]
     mean: float
     std: float  # over the missions
     episodes: int
@@ -54,14 +57,15 @@ class Point:
 @cache
 def points() -> tuple[Point, ...]:
     """Return all points of all curves, in the order of the file."""
-    rows = read_rows(Path(__file__).with_suffix(".csv"), "table", 1_000_000)
+    path = Path(__file__).with_suffix(".csv")
+    rows = read_rows(path, "table", 1_000_000)
     return msgspec.convert([row for _, row in rows], tuple[Point, ...], strict=False)
 
 
 class Panel(NamedTuple):
     """One pair of axes: a cost over the figure's x."""
 
-    cost: str  # aoi or velocity_variance, as results and published points name it
+    cost: Cost
     label: str  # with the cost's unit
     scale: Scale = "log"
 
@@ -73,10 +77,10 @@ class ResultFigure:
     published: str  # its name among the published points
     title: str
     task: Task
-    x_name: str  # a field of the mission, or receptive_field, a policy's own
+    x_name: MissionField | Literal["receptive_field"]  # the latter is a policy's own
     x_label: str  # with its unit
     x_scale: Scale = "linear"
-    irrelevant: tuple[str, ...] = ()  # fields that change nothing in this task
+    irrelevant: tuple[MissionField, ...] = ()  # fields that change nothing in this task
     panels: tuple[Panel, ...]
 
     @property
@@ -87,7 +91,8 @@ class ResultFigure:
     @property
     def xs(self) -> tuple[float, ...]:
         """The published curves' places on the x axis, ascending."""
-        return tuple(sorted({point.x for point in points() if point.figure == self.published}))
+        found = {point.x for point in points() if point.figure == self.published}
+        return tuple(sorted(found))
 
     @property
     def sweeps_missions(self) -> bool:
@@ -95,7 +100,7 @@ class ResultFigure:
         return self.x_name in OPTIONS
 
     @property
-    def fixed(self) -> tuple[str, ...]:
+    def fixed(self) -> tuple[MissionField, ...]:
         """The numbers of the mission that are fixed in the figure."""
         free = {self.x_name, *self.irrelevant}
         return tuple(name for name in OPTIONS if name not in free)
@@ -110,34 +115,68 @@ class ResultFigure:
 
     def arguments(self, preset: str) -> list[str]:
         """Return the arguments of `swarm-mj` that fly the figure's missions."""
-        swept = [OPTIONS[self.x_name], *(f"{x:g}" for x in self.xs)] if self.sweeps_missions else []
-        return ["evaluate", "--task", self.task, "--preset", preset, *swept]
+        arguments = ["evaluate", "--task", self.task, "--preset", preset]
+        if self.x_name in OPTIONS:
+            arguments.append(OPTIONS[self.x_name])
+            arguments += [f"{x:g}" for x in self.xs]
+        return arguments
 
 
-_ALL = msgspec.toml.decode(
-    Path(__file__).with_name("result_figures.toml").read_bytes(), type=dict[str, ResultFigure]
+RECEPTIVE_FIELD = ResultFigure(
+    published="fig3_receptive_field",
+    title="Receptive field",
+    task="stationary",
+    x_name="receptive_field",
+    x_label="receptive field of the GNN [hops]",
+    irrelevant=("velocity_ratio",),
+    panels=(Panel(cost="aoi", label="age of information [windows]", scale="linear"),),
 )
-
-RECEPTIVE_FIELD = _ALL["receptive_field"]
 """Stationary teams whose GNN looks one to several hops far (Fig. 3)."""
 
-TRANSMIT_POWER = _ALL["transmit_power"]
+TRANSMIT_POWER = ResultFigure(
+    published="fig4_transmit_power",
+    title="Transmit power",
+    task="stationary",
+    x_name="range_ratio",
+    x_label="range ratio: how far a packet reaches in silence [km]",
+    x_scale="log",
+    irrelevant=("velocity_ratio",),
+    panels=(Panel(cost="aoi", label="age of information [windows]"),),
+)
 """Stationary teams whose packets reach less or more far (Fig. 4)."""
 
-TEAM_SIZE = _ALL["team_size"]
+TEAM_SIZE = ResultFigure(
+    published="fig5_team_size",
+    title="Team size",
+    task="random-walk",
+    x_name="num_robots",
+    x_label="team size [robots]",
+    panels=(Panel(cost="aoi", label="age of information [windows]"),),
+)
 """Random walks of teams that are smaller or larger (Fig. 5)."""
 
-FLOCKING = _ALL["flocking"]
+FLOCKING = ResultFigure(
+    published="fig6_flocking",
+    title="Flocking",
+    task="flocking",
+    x_name="velocity_ratio",
+    x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
+    panels=(
+        Panel(cost="aoi", label="age of information [windows]"),
+        Panel(cost="velocity_variance", label="velocity variance [m²/s²]"),
+    ),
+)
 """Flocks that are slower or faster (Fig. 6)."""
 
 AOI, VARIANCE = FLOCKING.panels
-RESULT_FIGURES = {figure.name: figure for figure in _ALL.values()}
+_ALL = (RECEPTIVE_FIELD, TRANSMIT_POWER, TEAM_SIZE, FLOCKING)
+RESULT_FIGURES = {figure.name: figure for figure in _ALL}
 FIGURES = (FLOCK, *RESULT_FIGURES)
 # The figure that sweeps a field of a task's missions, all others as the paper sets them.
-SWEEPS = {figure.task: figure for figure in _ALL.values() if figure.sweeps_missions}
+SWEEPS = {figure.task: figure for figure in _ALL if figure.sweeps_missions}
 
 
-def published(policy: str, mission: Mission) -> dict[str, Point]:
+def published(policy: str, mission: Mission) -> dict[Cost, Point]:
     """Return what the paper reports for a policy, by cost, if only x differs from its preset."""
     if policy not in BASELINES or mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}
@@ -146,5 +185,9 @@ def published(policy: str, mission: Mission) -> dict[str, Point]:
     if mission != PAPERS[mission.preset](mission.task, **free):
         return {}
     x = getattr(mission, sweep.x_name)
-    found = (p for p in points() if p.figure == sweep.published and p.method == policy)
-    return {point.cost: point for point in found if point.x == x}
+    wanted = (sweep.published, policy, x)
+    found: dict[Cost, Point] = {}
+    for point in points():
+        if (point.figure, point.method, point.x) == wanted:
+            found[point.cost] = point
+    return found

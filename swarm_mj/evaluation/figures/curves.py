@@ -1,14 +1,14 @@
 """Curves from result files, and the published ones next to them."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
-from itertools import groupby
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.evaluation.published import OPTIONS, ResultFigure, points
+from swarm_mj.evaluation.published import OPTIONS, Cost, ResultFigure, points
 from swarm_mj.evaluation.results import Result, carries_more, config_of
 from swarm_mj.mission import PAPERS
 from swarm_mj.simulation.components import CALLED_WITH
@@ -37,6 +37,14 @@ class Curve:
     band: Float[np.ndarray, "2 X"] | None = None  # the means' least and greatest, of trainings
 
 
+class _Place(NamedTuple):
+    """A cost at one place on the axis."""
+
+    x: float
+    mean: float
+    sem: float  # nan where it is unknown
+
+
 def preset_of(results: Sequence[Result]) -> str:
     """Return the one preset of all results, one of the paper's; raise ValueError otherwise."""
     first, *others = dict.fromkeys(result.preset for result in results)
@@ -58,7 +66,7 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
     preset = preset_of(results)
     regime = figure.mission(preset)
     wanted = {name: getattr(regime, name) for name in ("task", *figure.fixed)}
-    found = [r for r in results if all(getattr(r, n) == value for n, value in wanted.items())]
+    found = [each for each in results if _has(each, wanted)]
     if not found:
         described = ", ".join(f"{name} {value}" for name, value in wanted.items())
         raise NoPointsError(
@@ -70,26 +78,48 @@ def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
     return found
 
 
-def curves(figure: ResultFigure, cost: str, results: Sequence[Result]) -> list[Curve]:
+def _has(result: Result, wanted: Mapping[str, object]) -> bool:
+    """Tell whether a result has these values in its columns."""
+    return all(getattr(result, name) == value for name, value in wanted.items())
+
+
+def curves(figure: ResultFigure, cost: Cost, results: Sequence[Result]) -> list[Curve]:
     """Return the published curves of a cost, by its column, then those of the results."""
+    return [*_published_curves(figure, cost), *_own_curves(figure, cost, results)]
+
+
+def _published_curves(figure: ResultFigure, cost: Cost) -> list[Curve]:
+    its_points: dict[str, list[_Place]] = {}
+    for point in points():
+        if point.figure == figure.published and point.cost == cost:
+            place = _Place(x=point.x, mean=point.mean, sem=point.sem)
+            its_points.setdefault(point.method, []).append(place)
     drawn = []
-    rows = [point for point in points() if (point.figure, point.cost) == (figure.published, cost)]
-    for method, its in groupby(rows, key=lambda point: point.method):
-        values = [(point.x, point.mean, point.sem) for point in its]
-        is_level = not figure.sweeps_missions and len({value[1:] for value in values}) == 1
-        drawn.append(_curve(method, values, is_published=True, is_level=is_level))
+    for method, places in its_points.items():
+        # The paper repeats a baseline's value at each receptive field, which it does not have.
+        is_one_value = len({(place.mean, place.sem) for place in places}) == 1
+        is_level = is_one_value and not figure.sweeps_missions
+        drawn.append(_curve(method, places, is_published=True, is_level=is_level))
+    return drawn
+
+
+def _own_curves(figure: ResultFigure, cost: Cost, results: Sequence[Result]) -> list[Curve]:
     more = {method_of(result) for result in results if carries_more(result)}
-    own: dict[tuple[str, bool], list[tuple[float, float, float]]] = {}
+    own: dict[tuple[str, bool], list[_Place]] = {}
     for result in results:
         x = _x(figure, result)
+        mean = getattr(result, f"{cost}_mean")
+        sem = getattr(result, f"{cost}_sem")
+        if sem is None:
+            sem = math.nan
         # A policy without a receptive field is level: the same at both ends of the axis.
         ends = (figure.xs[0], figure.xs[-1]) if x is None else (x,)
-        mean, sem = getattr(result, f"{cost}_mean"), getattr(result, f"{cost}_sem")
-        sem = math.nan if sem is None else sem
-        key = method_of(result), x is None
-        own.setdefault(key, []).extend((end, mean, sem) for end in ends)
-    for (method, is_level), values in own.items():
-        drawn.append(_curve(method, values, is_level=is_level, carries_more=method in more))
+        places = own.setdefault((method_of(result), x is None), [])
+        for end in ends:
+            places.append(_Place(x=end, mean=mean, sem=sem))
+    drawn = []
+    for (method, is_level), places in own.items():
+        drawn.append(_curve(method, places, is_level=is_level, carries_more=method in more))
     return drawn
 
 
@@ -98,16 +128,33 @@ def method_of(result: Result) -> str:
     return result.policy.partition(", seed ")[0]
 
 
-def _curve(method: str, rows: Iterable[tuple[float, float, float]], **traits: bool) -> Curve:
+def _curve(
+    method: str,
+    places: Sequence[_Place],
+    *,
+    is_level: bool,
+    is_published: bool = False,
+    carries_more: bool = False,
+) -> Curve:
     """Return a curve of means; of several trainings at an x their mean, without its error."""
-    columns = []
-    for x, its in groupby(sorted(rows), key=lambda row: row[0]):
-        means, sems = np.array([row[1:] for row in its], dtype=float).T
-        sem = sems[0] if len(sems) == 1 else math.nan
-        columns.append((x, means.mean(), sem, means.min(), means.max()))
-    x, mean, sem, *ends = np.array(columns).T
-    band = None if np.array_equal(*ends) else np.array(ends)
-    return Curve(method=method, x=x, mean=mean, sem=sem, band=band, **traits)
+    means_at: dict[float, list[float]] = {}
+    sems_at: dict[float, list[float]] = {}
+    for place in sorted(places):
+        means_at.setdefault(place.x, []).append(place.mean)
+        sems_at.setdefault(place.x, []).append(place.sem)
+    means = [np.array(each, dtype=float) for each in means_at.values()]
+    low = np.array([each.min() for each in means])
+    high = np.array([each.max() for each in means])
+    return Curve(
+        method=method,
+        is_published=is_published,
+        carries_more=carries_more,
+        is_level=is_level,
+        x=np.array(list(means_at), dtype=float),
+        mean=np.array([each.mean() for each in means]),
+        sem=np.array([sems[0] if len(sems) == 1 else math.nan for sems in sems_at.values()]),
+        band=None if np.array_equal(low, high) else np.stack([low, high]),
+    )
 
 
 def _x(figure: ResultFigure, result: Result) -> float | None:
