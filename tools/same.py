@@ -19,19 +19,23 @@ import csv
 import dataclasses
 import fnmatch
 import hashlib
+import io
 import json
 import os
 import platform
+import runpy
 import signal
 import subprocess
 import sys
 import tempfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import redirect_stderr, redirect_stdout
 from importlib.metadata import PackageNotFoundError, version
 from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
+from unittest import mock
 
 import numpy as np
 from rich.console import Console
@@ -177,11 +181,15 @@ def train(options: str, folder: Path) -> str:
     """Train, and return the trace: a step for each evaluation, and the last for the weights."""
     from safetensors.numpy import load_file
 
-    command = [sys.executable, "-m", "swarm_mj", "train", "--out", "run", *options.split()]
-    # In an empty folder, so that -m takes swarm_mj from where this process has it.
-    done = subprocess.run(command, cwd=folder, capture_output=True, text=True)
-    if done.returncode:
-        raise RuntimeError(f"training ended with {done.returncode}: {done.stderr.strip()[-300:]}")
+    said = io.StringIO()
+    arguments = ["swarm-mj", "train", "--out", str(folder / "run"), *options.split()]
+    # Within this process: to import what trains takes longer than to train so little.
+    with mock.patch("sys.argv", arguments), redirect_stdout(said), redirect_stderr(said):
+        try:
+            runpy.run_module("swarm_mj", run_name="__main__")
+        except SystemExit as end:
+            if end.code:
+                raise RuntimeError(f"exit code {end.code}: {said.getvalue()[-300:]}") from end
     tracer = Tracer()
     with (folder / "run" / "curve.csv").open(newline="") as file:
         for row in csv.DictReader(file):

@@ -419,7 +419,8 @@ RESULTS: tuple[Comparison, ...] = (
     ),
 )
 
-# Options of `swarm-mj train`; with these seeds, the policy that is kept is one that learned.
+# Options of `swarm-mj train`. With these, the policy that is kept is one that has learned, and not
+# the one that the training began with.
 SHORT = "--windows 20 --missions 4 --held-out 2 --device cpu --threads 1"
 TRAININGS: dict[str, str] = {
     "training-robot-extended": (
@@ -432,11 +433,11 @@ TRAININGS: dict[str, str] = {
     ),
     "training-team-paper": (
         f"{SHORT} --credit team --task random-walk --robots 6 --latent 8"
-        " --budget 64 --evaluate-every 16"
+        " --seed 1 --learning-rate 0.003 --budget 64 --evaluate-every 16"
     ),
     "training-team-reference": (
         f"{SHORT} --credit team --preset reference --task flocking --robots 6"
-        " --reward velocity-variance --latent 6 --depth 2 --receptive-field 2 --linear --seed 3"
-        " --budget 64 --evaluate-every 16"
+        " --reward velocity-variance --latent 6 --depth 2 --receptive-field 2 --linear --seed 1"
+        " --learning-rate 0.003 --budget 64 --evaluate-every 16"
     ),
 }
