@@ -26,7 +26,7 @@ from swarm_mj.physics.scene import compose
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import mean_hops, window_costs
-from swarm_mj.protocol.window import channel_at, window
+from swarm_mj.protocol.window import channel_at
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.needs import FLYING, check_fits, peak_memory
 from swarm_mj.system.packages import commit, version
@@ -208,7 +208,9 @@ def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], obj
     """
 
     def talk() -> None:
-        window(swarm.buffers, swarm.states, recipient, swarm.channel, swarm.now)
+        swarm.talk.window(
+            swarm.buffers, swarm.states, recipient, now=swarm.now, silence_is_attempt=False
+        )
         swarm.now = swarm.now + 1.0
 
     return talk

@@ -14,9 +14,8 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.compiled_window import silence
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, merge_timestamps, observe_own
-from swarm_mj.protocol.window import Phase, channel_at, respondents
+from swarm_mj.protocol.window import Phase, channel_at, respondents, silence
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 

@@ -15,7 +15,12 @@ from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
-from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
+from swarm_mj.protocol.costs import (
+    WindowCosts,
+    age_of_information,
+    no_packets,
+    velocity_variance,
+)
 from swarm_mj.protocol.mission_costs import AOI, MISSION_COSTS, TASK_COST, VELOCITY_VARIANCE
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
@@ -67,10 +72,12 @@ class MissionBatch:
         self.seeds = list(seeds)
         self.last_window = last_window or self.mission.num_windows
         # Of the last window. Before the first nothing is known and nothing was sent.
+        age_windows, is_complete = age_of_information(self.swarm.buffers, self.swarm.now)
         self.costs = WindowCosts(
-            *age_of_information(self.swarm.buffers, self.swarm.now),
-            velocity_variance(self.swarm.states.velocity_mps),
-            counts=np.zeros((2, 5, self.num_missions)),
+            age_windows=age_windows,
+            is_complete=is_complete,
+            velocity_variance_m2ps2=velocity_variance(self.swarm.states.velocity_mps),
+            counts=no_packets(self.num_missions),
             is_broadcast=False,
             task_cost=self.swarm.task_cost(),
         )

@@ -21,7 +21,13 @@ ABSENT = -np.inf  # T of an entry that a packet has no room for: older than all 
 
 @dataclass(frozen=True, kw_only=True)
 class Buffers:
-    """The knowledge of every robot i about every robot j, in all B missions (Fig. 1)."""
+    """The knowledge of every robot i about every robot j, in all B missions (Fig. 1).
+
+    Example:
+        How many windows old robot 0's news of robot 3 is, in the first mission:
+
+        >>> swarm.now[0] - swarm.buffers.timestamp[0, 0, 3]
+    """
 
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j}: when j observed it [windows], or NEVER
     position_m: Float[np.ndarray, "B N N 2"]  # M^{i,j}: where j was, as i knows it [m]
@@ -43,9 +49,11 @@ class Buffers:
 
     def read_only(self) -> "Buffers":
         """Return the same arrays, seen through views that cannot be written."""
-        views = {spec.name: getattr(self, spec.name).view() for spec in fields(Buffers)}
-        for view in views.values():
+        views = {}
+        for spec in fields(Buffers):
+            view = getattr(self, spec.name).view()
             view.flags.writeable = False
+            views[spec.name] = view
         return Buffers(**views)
 
 
@@ -71,8 +79,15 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 
 def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
     """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
-    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps
-    write_own(*known, states.own_m, states.velocity_mps, now, states.is_active)
+    write_own(
+        timestamp=buffers.timestamp,
+        believed_m=buffers.position_m,
+        believed_mps=buffers.velocity_mps,
+        position_m=states.own_m,
+        velocity_mps=states.velocity_mps,
+        now=now,
+        is_active=states.is_active,
+    )
 
 
 def record_attempt(
@@ -85,10 +100,21 @@ def record_attempt(
 ) -> None:
     """Note when each active robot last addressed its recipient (Eq. 7).
 
-    None for `is_active` is everyone. A silent robot addresses itself, which may count as an
-    attempt; `BROADCAST` addresses no robot.
+    Args:
+        buffers: The robots' buffers, of which L is written.
+        recipient: Whom each robot addresses, [B, N]; itself is silence. `BROADCAST` addresses no
+            robot.
+        now: t, [B] [windows].
+        is_active: Who notes anything, [B, N]; None is everyone.
+        silence_is_attempt: Whether a silent robot notes having addressed itself.
     """
-    write_attempt(buffers.last_attempt, recipient, now, silence_is_attempt, is_active)
+    write_attempt(
+        last_attempt=buffers.last_attempt,
+        recipient=recipient,
+        now=now,
+        silence_is_attempt=silence_is_attempt,
+        is_active=is_active,
+    )
 
 
 def merge(
@@ -98,14 +124,25 @@ def merge(
 ) -> None:
     """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
 
-    A packet holds its sender's buffer as it was before the phase: all of it, or the entries with a
-    T in `sent[b, i]`, others being `ABSENT`. Information that comes straight from its subject gets
-    the receiver as parent (II-B: P^{i,k} = i). An entry keeps its parent if the parent's own entry
-    is in the packet, and otherwise names the sender: so buffers remain trees, although some robots
-    on the way are left out.
+    A packet holds its sender's buffer as it was before the phase. Information that comes straight
+    from its subject gets the receiver as parent (II-B: P^{i,k} = i). An entry keeps its parent if
+    the parent's own entry is in the packet, and otherwise names the sender: so buffers remain
+    trees, although some robots on the way are left out.
+
+    Args:
+        buffers: The robots' buffers, written in place.
+        heard: The sender that each robot decoded, [B, N]; itself is nobody.
+        sent: T of the entries in each robot's packet, [B, N, N] [windows], `ABSENT` for those that
+            it left out; None is the whole buffer.
     """
-    known = buffers.timestamp, buffers.position_m, buffers.velocity_mps, buffers.parent
-    merge_newer(buffers.timestamp if sent is None else sent, heard, *known)
+    merge_newer(
+        sent=buffers.timestamp if sent is None else sent,
+        heard=heard,
+        timestamp=buffers.timestamp,
+        position_m=buffers.position_m,
+        velocity_mps=buffers.velocity_mps,
+        parent=buffers.parent,
+    )
 
 
 @compiled()
@@ -164,10 +201,15 @@ def merge_newer(
     for b in range(num_missions):
         # Packets are read from the buffers before the phase: a copy where a sender also decodes,
         # which only the reference preset lets happen; else no row is both read and written.
-        sent_t, sent_m, sent_mps, sent_parent = sent[b], position_m[b], velocity_mps[b], parent[b]
+        sent_t = sent[b]
+        sent_m = position_m[b]
+        sent_mps = velocity_mps[b]
+        sent_parent = parent[b]
         if _senders_listen(heard[b]):
-            sent_t, sent_m = sent_t.copy(), sent_m.copy()
-            sent_mps, sent_parent = sent_mps.copy(), sent_parent.copy()
+            sent_t = sent_t.copy()
+            sent_m = sent_m.copy()
+            sent_mps = sent_mps.copy()
+            sent_parent = sent_parent.copy()
         for i in range(num_robots):
             j = heard[b, i]
             if j == i:

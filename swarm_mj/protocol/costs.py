@@ -42,10 +42,16 @@ def age_of_information(
 ) -> tuple[Float[np.ndarray, "B"], Bool[np.ndarray, "B"]]:
     """Return the mean over all pairs i, j of t - T^{i,j}, own age included (Eq. 10).
 
-    The age at t is in windows. Second is whether all robots know all. Pairs of active robots count,
-    at least one robot's in each mission; None is all robots.
+    Args:
+        buffers: What the robots know.
+        now: t, [B] [windows].
+        is_active: Whose pairs count, [B N], at least one robot's in each mission; None is all.
+
+    Returns:
+        The age, [B] [windows], and whether all robots know all, [B].
     """
-    age, is_complete = np.empty(len(now)), buffers.is_granted.copy()
+    age = np.empty(len(now))
+    is_complete = buffers.is_granted.copy()
     _mean_age(buffers.timestamp, now, is_active, age, is_complete)
     return age, is_complete
 
@@ -58,7 +64,8 @@ def velocity_variance(
     variance = np.empty(velocity_mps.shape[0])
     for b in range(velocity_mps.shape[0]):
         active_mps = velocity_mps[b] if is_active is None else velocity_mps[b][is_active[b]]
-        total, num_active = 0.0, active_mps.shape[0]
+        total = 0.0
+        num_active = active_mps.shape[0]
         for axis in range(2):
             mean = 0.0
             for i in range(num_active):
@@ -93,36 +100,67 @@ class TaskCost:
     value: Float[np.ndarray, "B"]
 
 
+class CountRows(NamedTuple):
+    """The rows of `WindowCosts.counts`: what is counted of the packets of a window's two slots."""
+
+    sent_first: int  # in the first slot
+    sent_second: int
+    delivered_first: int  # of the first slot's, decoded by their recipient
+    delivered_second: int
+    overheard: int  # in both slots: receptions of what was meant for another
+    heard: int  # in both slots: packets that at least one robot decoded
+    receptions: int  # in both slots: times that a robot decoded a packet
+
+
+# One array of named rows, not seven arrays: those take as long to make and to pass to compiled
+# code as all costs of a single mission take to measure.
+ROW = CountRows(*range(len(CountRows._fields)))
+
+
+def no_packets(num_missions: int) -> Float[np.ndarray, "K B"]:
+    """Return counts of 0."""
+    return np.zeros((len(ROW), num_missions))
+
+
 class WindowCosts(NamedTuple):
     """The costs of one window, in every mission."""
 
     age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
     is_complete: Bool[np.ndarray, "B"]  # whether all robots know all others
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
-    # Packets of both phases: sent, delivered, overheard, heard, and receptions, as in `Packets`.
-    counts: Float[np.ndarray, "2 5 B"]
-    is_broadcast: bool  # whether both phases are broadcasts (IV-C), or the second answers (Alg. 1)
+    counts: Float[np.ndarray, "K B"]  # of packets, by the rows of `ROW` [packets]
+    is_broadcast: bool  # whether both slots hold broadcasts (IV-C), or the second answers (Alg. 1)
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
 
     @property
     def packets(self) -> Packets:
         """The fates of the packets."""
-        first, second = self.counts
-        transmitted, _, overheard, heard, receptions = first + second
+        counts = self.counts
+        transmitted = counts[ROW.sent_first] + counts[ROW.sent_second]
+        none = np.full(len(transmitted), np.nan)
         if self.is_broadcast:
-            counts = {"sent": transmitted, "heard": heard, "receptions": receptions}
-        else:
-            sent, delivered = first[:2]
-            counts = {
-                "sent": sent,
-                "attempted": sent,
-                "delivered": delivered,
-                "lost": sent - delivered,
-                "overheard": overheard,
-                "answered": second[1],
-            }
-        none = dict.fromkeys(PACKET_COUNTS, np.full(len(transmitted), np.nan))
-        return Packets(**none | counts | {"transmitted": transmitted})
+            return Packets(
+                sent=transmitted,
+                transmitted=transmitted,
+                attempted=none,
+                delivered=none,
+                lost=none,
+                overheard=none,
+                answered=none,
+                heard=counts[ROW.heard],
+                receptions=counts[ROW.receptions],
+            )
+        return Packets(
+            sent=counts[ROW.sent_first],
+            transmitted=transmitted,
+            attempted=counts[ROW.sent_first],
+            delivered=counts[ROW.delivered_first],
+            lost=counts[ROW.sent_first] - counts[ROW.delivered_first],
+            overheard=counts[ROW.overheard],
+            answered=counts[ROW.delivered_second],
+            heard=none,
+            receptions=none,
+        )
 
 
 def window_costs(
@@ -134,13 +172,46 @@ def window_costs(
     is_broadcast: bool,
     task_cost: TaskCost | None = None,
 ) -> WindowCosts:
-    """Return all costs of one window for the active robots; arguments as above."""
+    """Return all costs of one window for the active robots.
+
+    Args:
+        buffers: What the robots know after the window.
+        states: Where they are after it, and who is active.
+        phases: Whom they addressed and decoded in its two slots.
+        now: t after it, [B] [windows].
+        is_broadcast: Whether both slots hold broadcasts, or the second answers the first.
+        task_cost: What the robots' own task costs after it, if it has a cost.
+    """
     first, second = phases
-    age, is_complete = np.empty(len(now)), buffers.is_granted.copy()
-    costs = age, is_complete, np.empty(len(now)), np.zeros((2, 5, len(now)))
-    flown = buffers.timestamp, now, states.velocity_mps, states.is_active
-    _measure(*flown, *first, *second, *costs)
-    return WindowCosts(*costs, is_broadcast, task_cost)
+    num_missions = len(now)
+    age = np.empty(num_missions)
+    is_complete = buffers.is_granted.copy()
+    variance = np.empty(num_missions)
+    counts = no_packets(num_missions)
+    # All in one call: of a single mission, calls take longer than what they do. The arrays are
+    # flat, by name: to take named tuples of them apart would take longer, too.
+    _measure(
+        timestamp=buffers.timestamp,
+        now=now,
+        velocity_mps=states.velocity_mps,
+        is_active=states.is_active,
+        recipient_first=first.recipient,
+        heard_first=first.heard,
+        recipient_second=second.recipient,
+        heard_second=second.heard,
+        age=age,
+        is_complete=is_complete,
+        variance=variance,
+        counts=counts,
+    )
+    return WindowCosts(
+        age_windows=age,
+        is_complete=is_complete,
+        velocity_variance_m2ps2=variance,
+        counts=counts,
+        is_broadcast=is_broadcast,
+        task_cost=task_cost,
+    )
 
 
 # In these, None for `is_active` is compiled apart: without the tests, and as fast as without them.
@@ -155,7 +226,9 @@ def _mean_age(
 ) -> None:
     for b in range(len(now)):
         active = timestamp[b] if is_active is None else timestamp[b][is_active[b]][:, is_active[b]]
-        total, num_unknown, num_active = 0.0, 0, active.shape[0]
+        total = 0.0
+        num_unknown = 0
+        num_active = active.shape[0]
         for i in range(num_active):
             for j in range(num_active):
                 total += active[i, j]
@@ -170,32 +243,51 @@ def _measure(
     now: Float[np.ndarray, "B"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     is_active: Bool[np.ndarray, "B N"] | None,
-    recipient: Int[np.ndarray, "B N"],
-    heard: Int[np.ndarray, "B N"],
-    recipient_2: Int[np.ndarray, "B N"],
-    heard_2: Int[np.ndarray, "B N"],
+    recipient_first: Int[np.ndarray, "B N"],
+    heard_first: Int[np.ndarray, "B N"],
+    recipient_second: Int[np.ndarray, "B N"],
+    heard_second: Int[np.ndarray, "B N"],
     age: Float[np.ndarray, "B"],
     is_complete: Bool[np.ndarray, "B"],
     variance: Float[np.ndarray, "B"],
-    counts: Float[np.ndarray, "2 C B"],  # of zeros
+    counts: Float[np.ndarray, "K B"],
 ) -> None:
-    """Fill in all costs, in one call: of a single mission, calls cost more than what they do."""
+    """Fill in all costs, from `age` on; counts are added to, so they begin at 0."""
     _mean_age(timestamp, now, is_active, age, is_complete)
     by_mission = velocity_variance(velocity_mps, is_active)
     for b in range(variance.shape[0]):
         variance[b] = by_mission[b]
-    _count(recipient, heard, counts[0])
-    _count(recipient_2, heard_2, counts[1])
+    _count(
+        recipient=recipient_first,
+        heard=heard_first,
+        sent=counts[ROW.sent_first],
+        delivered=counts[ROW.delivered_first],
+        overheard=counts[ROW.overheard],
+        num_heard=counts[ROW.heard],
+        receptions=counts[ROW.receptions],
+    )
+    _count(
+        recipient=recipient_second,
+        heard=heard_second,
+        sent=counts[ROW.sent_second],
+        delivered=counts[ROW.delivered_second],
+        overheard=counts[ROW.overheard],
+        num_heard=counts[ROW.heard],
+        receptions=counts[ROW.receptions],
+    )
 
 
 @compiled()
 def _count(
     recipient: Int[np.ndarray, "B N"],
     heard: Int[np.ndarray, "B N"],
-    counts: Float[np.ndarray, "C B"],
+    sent: Float[np.ndarray, "B"],
+    delivered: Float[np.ndarray, "B"],
+    overheard: Float[np.ndarray, "B"],
+    num_heard: Float[np.ndarray, "B"],
+    receptions: Float[np.ndarray, "B"],
 ) -> None:
-    sent, delivered, overheard = counts[0], counts[1], counts[2]
-    num_heard, receptions = counts[3], counts[4]
+    """Add one slot's packets to the counts."""
     for b in range(recipient.shape[0]):
         is_heard = np.zeros(recipient.shape[1], dtype=np.bool_)
         for i in range(recipient.shape[1]):
@@ -217,17 +309,21 @@ def _mean_depth(
     is_active: Bool[np.ndarray, "B N"],
     hops: Float[np.ndarray, "B"],
 ) -> bool:
-    """Fill `hops`; returns whether all parents form trees."""
+    """Fill `hops`; return whether all parents form trees."""
     num_missions, num_robots = parent.shape[:2]
-    depth, path = np.empty(num_robots, dtype=np.int64), np.empty(num_robots, dtype=np.int64)
+    depth = np.empty(num_robots, dtype=np.int64)
+    path = np.empty(num_robots, dtype=np.int64)
     for b in range(num_missions):
-        total, num_known = 0, 0
+        total = 0
+        num_known = 0
         for i in np.nonzero(is_active[b])[0]:
             depth[:] = -1
             depth[i] = 0
             for j in range(num_robots):
                 if timestamp[b, i, j] > NEVER and j != i:
-                    k, length = j, 0
+                    # Up to a robot whose depth is known, then back down, so that each is met once.
+                    k = j
+                    length = 0
                     while depth[k] < 0:
                         path[length] = k
                         length += 1

@@ -2,25 +2,29 @@
 
 A window has two slots. In Alg. 1 they hold a transmission phase and a response phase. In IV-C both
 are broadcasts that nobody answers. Index order: `[b, i]` is robot `i` of mission `b`.
+
+`window` and `broadcast` are the text to read, and play over any channel whose packets arrive in the
+slot in which they were sent. `compiled_window` does the same in one compiled call, for the paper's
+radio; `asynchronous_window` is for channels whose packets may arrive a slot late. `talk_over`, in
+`protocol.talk`, chooses among the three when a swarm starts.
 """
 
 from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar, NamedTuple
+from typing import ClassVar, NamedTuple, Protocol
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.compiled_window import answer, silence, talk
-from swarm_mj.protocol.packets import PartialBuffers, entries_sent
+from swarm_mj.protocol.packets import entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
-from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
+from swarm_mj.system.compiled import compiled
 
 
 class Phase(NamedTuple):
@@ -36,11 +40,23 @@ class LocalViews:
 
     Identities are the index i, the team's size is N; both are granted before the mission (II-C).
     The buffers are live: they cannot be written, and change with the next window.
+
+    Args:
+        buffers: What every robot knows about every other; robot i's is row `[b, i]` of each array.
+        now: t on the synchronised clock, [B] [windows].
+        phases: Whom each robot addressed and heard, slot by slot: of this window, or else of the
+            last. Before the first window it is empty.
+
+    Example:
+        A robot that asks the teammate whose news is the oldest:
+
+        >>> views = Swarm(paper("stationary"), [1]).views
+        >>> recipient = np.argmin(views.buffers.timestamp, axis=2)
     """
 
-    buffers: Buffers  # robot i's buffer is row [b, i]
-    now: Float[np.ndarray, "B"]  # t on the synchronised clock [windows]
-    phases: tuple[Phase, ...]  # of this window, or else the last: whom robot i addressed and heard
+    buffers: Buffers
+    now: Float[np.ndarray, "B"]
+    phases: tuple[Phase, ...]
 
     def copy(self) -> "LocalViews":
         """Return the same for code that may write: new arrays, and the buffers, which none can."""
@@ -61,6 +77,171 @@ class LocalViews:
 def _oneself(shape: tuple[int, int]) -> Int[np.ndarray, "B N"]:
     """Return every robot's own identity."""
     return np.broadcast_to(np.arange(shape[1]), shape)
+
+
+def window(
+    buffers: Buffers,
+    states: RobotStates,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    *,
+    silence_is_attempt: bool = False,
+) -> tuple[Phase, Phase]:
+    """Play one communication window: a transmission phase, then a response phase (Alg. 1).
+
+    Args:
+        buffers: The robots' buffers at t; they are written in place.
+        states: Where the robots truly are, and what they observe of themselves; fixed meanwhile.
+        recipient: Whom each robot addresses, from 0 to N - 1, or `BROADCAST`; itself is silence.
+        channel: Who decodes whom. Its packets must arrive in the slot in which they were sent; for
+            an `AsynchronousChannel` there is `asynchronous_window.window`.
+        now: t when the window begins, [B] [windows].
+        silence_is_attempt: Whether a silent robot notes having addressed itself (Eq. 7).
+
+    Returns:
+        The transmission phase and the response phase.
+
+    Raises:
+        ValueError: If a user's own channel answers what is no robot, or a robot that is silent.
+    """
+    # Transmission phase. The robots have decided already, as in the authors' code; see
+    # `RequestResponse`.
+    t = now + SLOT_WINDOWS
+    observe_self(buffers, states, t)
+    record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
+    request = transmit(states, recipient, channel, t)
+    merge(buffers, request.heard, entries_sent(buffers, request.recipient))
+
+    # Response phase.
+    t = t + SLOT_WINDOWS
+    observe_self(buffers, states, t)
+    response = transmit(states, respondents(request), channel, t)
+    merge(buffers, response.heard, entries_sent(buffers, response.recipient))
+    return request, response
+
+
+def broadcast(
+    buffers: Buffers,
+    states: RobotStates,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    *,
+    silence_is_attempt: bool = False,
+) -> Phase:
+    """Play a single slot, whose packets nobody answers (IV-C): a transmission phase alone.
+
+    Arguments and errors are those of `window`; `now` is when the slot begins.
+    """
+    t = now + SLOT_WINDOWS
+    observe_self(buffers, states, t)
+    record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
+    phase = transmit(states, recipient, channel, t)
+    merge(buffers, phase.heard, entries_sent(buffers, phase.recipient))
+    return phase
+
+
+def transmit(
+    states: RobotStates,
+    recipient: Int[np.ndarray, "B N"],
+    channel: Channel | VaryingChannel,
+    t: Float[np.ndarray, "B"],
+) -> Phase:
+    """Return what the channel makes of the packets of the slot that ends at t [windows] (Eq. 6).
+
+    Inactive robots are silent, and decode nothing.
+    """
+    sent_to = recipient.copy()
+    silence(sent_to, states.is_active)
+    heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
+    silence(heard, states.is_active)
+    return Phase(recipient=sent_to, heard=heard)
+
+
+def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
+    """Return whom each robot answers: the sender it decoded, if that packet was meant for it."""
+    answered = np.empty_like(transmission.recipient)
+    answer(transmission.recipient, transmission.heard, answered)
+    return answered
+
+
+@compiled()
+def answer(
+    recipient: Int[np.ndarray, "B N"],
+    heard: Int[np.ndarray, "B N"],
+    answered: Int[np.ndarray, "B N"],
+) -> None:
+    """Fill in whom each robot answers: the sender it decoded, if that packet was meant for it."""
+    for b in range(recipient.shape[0]):
+        for j in range(recipient.shape[1]):
+            i = heard[b, j]
+            answered[b, j] = i if recipient[b, i] == j else j
+
+
+@compiled()
+def silence(robots: Int[np.ndarray, "B N"], is_active: Bool[np.ndarray, "B N"] | None) -> None:
+    """Give inactive robots their own identities for their choices: silence, or no one."""
+    if is_active is not None:
+        for b in range(robots.shape[0]):
+            for i in range(robots.shape[1]):
+                if not is_active[b, i]:
+                    robots[b, i] = i
+
+
+def channel_at(
+    channel: Channel | VaryingChannel,
+    now: Float[np.ndarray, "B"],
+    mission: Int[np.ndarray, "B"] | None = None,
+) -> Channel:
+    """Return the channel of the slot that ends at t, row by row [windows].
+
+    Rows are those of these missions; None is all missions in order.
+    """
+    # The usual radio is asked for first: to ask for a runtime protocol takes 10 µs.
+    if isinstance(channel, FreeSpaceRadio) or not isinstance(channel, VaryingChannel):
+        return channel
+    slot = np.rint(now * SLOTS_PER_WINDOW).astype(np.int64) - 1
+    return channel.at(slot, np.arange(len(now)) if mission is None else mission)
+
+
+class PlayWindow(Protocol):
+    """What plays a window of Alg. 1 over a channel of its own; arguments as in `window`."""
+
+    def __call__(
+        self,
+        buffers: Buffers,
+        states: RobotStates,
+        recipient: Int[np.ndarray, "B N"],
+        *,
+        now: Float[np.ndarray, "B"],
+        silence_is_attempt: bool,
+    ) -> tuple[Phase, Phase]:
+        """Return the transmission phase and the response phase."""
+        ...
+
+
+class PlayBroadcast(Protocol):
+    """What plays a slot of broadcasts over a channel of its own; arguments as in `broadcast`."""
+
+    def __call__(
+        self,
+        buffers: Buffers,
+        states: RobotStates,
+        recipient: Int[np.ndarray, "B N"],
+        *,
+        now: Float[np.ndarray, "B"],
+        silence_is_attempt: bool,
+    ) -> Phase:
+        """Return the slot's phase."""
+        ...
+
+
+class Talk(NamedTuple):
+    """How robots talk over one channel: one implementation of windows, which `talk_over` chose."""
+
+    window: PlayWindow
+    broadcast: PlayBroadcast
 
 
 # Whom each robot addresses next, given the phases of this window so far.
@@ -84,17 +265,18 @@ class RequestResponse:
         buffers: Buffers,
         decide: Decide,
         move: Move,
-        channel: Channel | VaryingChannel,
+        talk: Talk,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, ...]:
         """Play one window from t on [windows], and return the phases of its two slots.
 
         Decisions are trusted; a user's own channel is checked (`checked_decode`).
         """
-        noted = self.silence_is_attempt
         recipient = decide(())
         states = move()
-        return window(buffers, states, recipient, channel, now, silence_is_attempt=noted)
+        return talk.window(
+            buffers, states, recipient, now=now, silence_is_attempt=self.silence_is_attempt
+        )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -115,22 +297,27 @@ class DoubleBroadcast:
         buffers: Buffers,
         decide: Decide,
         move: Move,
-        channel: Channel | VaryingChannel,
+        talk: Talk,
         now: Float[np.ndarray, "B"],
     ) -> tuple[Phase, ...]:
         """Play one window; arguments as in `RequestResponse`."""
-        noted = self.silence_is_attempt
         recipient = self._addressed(decide(()))
         states = move()
-        first = window(buffers, states, recipient, channel, now, 1, silence_is_attempt=noted)
+        first = talk.broadcast(
+            buffers, states, recipient, now=now, silence_is_attempt=self.silence_is_attempt
+        )
 
-        recipient = self._addressed(decide(first))
+        recipient = self._addressed(decide((first,)))
         if self.moves_each_slot:
             states = move()
         t = now + SLOT_WINDOWS
-        return first + window(buffers, states, recipient, channel, t, 1, silence_is_attempt=noted)
+        second = talk.broadcast(
+            buffers, states, recipient, now=t, silence_is_attempt=self.silence_is_attempt
+        )
+        return first, second
 
     def _addressed(self, recipient: Int[np.ndarray, "B N"]) -> Int[np.ndarray, "B N"]:
+        """Return the recipients, or addressees where a broadcast needs one."""
         if not self.needs_addressees:
             return recipient
         next_identity = (np.arange(recipient.shape[1]) + 1) % recipient.shape[1]
@@ -138,67 +325,3 @@ class DoubleBroadcast:
 
 
 WindowProtocol = RequestResponse | DoubleBroadcast  # a policy chooses one
-
-
-def window(
-    buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    num_slots: int = 2,
-    *,
-    silence_is_attempt: bool = False,
-) -> tuple[Phase, ...]:
-    """Play one communication window: a transmission phase, then a response phase (Alg. 1).
-
-    A single slot has no responses; there robots address a teammate or, with BROADCAST, everyone
-    (III-B, IV-C). Buffers are written in place; `states` are true, and fixed meanwhile; the clock
-    shows the start of the first slot [windows]. Silence may count as addressing oneself (Eq. 7).
-
-    `compiled_window.talk` does the same in one call, where radio and packets are the paper's.
-    """
-    now = now + SLOT_WINDOWS
-    if type(channel) is FreeSpaceRadio and not isinstance(buffers, PartialBuffers):
-        said = talk(buffers, states, recipient, channel, now, num_slots, silence_is_attempt)
-        return tuple([Phase(said[s, 0], said[s, 1]) for s in range(num_slots)])
-    record_attempt(buffers, recipient, now, states.is_active, silence_is_attempt=silence_is_attempt)
-    phases, answers = [], recipient.copy()
-    for slot in range(num_slots):
-        t, sent_to = now + slot * SLOT_WINDOWS, answers
-        silence(sent_to, states.is_active)
-        if not isinstance(channel, AsynchronousChannel):  # a user's channel may look at buffers
-            observe_self(buffers, states, t)
-        heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
-        silence(heard, states.is_active)
-        phases.append(punctual := Phase(recipient=sent_to, heard=heard))
-        if isinstance(channel, AsynchronousChannel):  # late packets carry what was known before
-            late, punctual = (Phase(*each) for each in channel.split(heard))
-            merge(buffers, late.heard, entries_sent(buffers, late.recipient))
-            observe_self(buffers, states, t)
-        merge(buffers, punctual.heard, entries_sent(buffers, punctual.recipient))
-        answers = respondents(punctual)
-    return tuple(phases)
-
-
-def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
-    """Return whom each robot answers: the sender it decoded, if that packet was meant for it."""
-    answered = np.empty_like(transmission.recipient)
-    answer(transmission.recipient, transmission.heard, answered)
-    return answered
-
-
-def channel_at(
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
-    mission: Int[np.ndarray, "B"] | None = None,
-) -> Channel:
-    """Return the channel of the slot that ends at t, row by row [windows].
-
-    Rows are those of these missions; None is all missions in order.
-    """
-    # The usual radio is asked for first: to ask for a runtime protocol takes 10 µs.
-    if isinstance(channel, FreeSpaceRadio) or not isinstance(channel, VaryingChannel):
-        return channel
-    slot = np.rint(now * SLOTS_PER_WINDOW).astype(np.int64) - 1
-    return channel.at(slot, np.arange(len(now)) if mission is None else mission)

@@ -25,6 +25,7 @@ from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, obser
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.packets import Packet, fitting, packet_of, with_room
+from swarm_mj.protocol.talk import talk_over
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowProtocol
 from swarm_mj.radio.free_space import Channel, VaryingChannel
@@ -40,9 +41,39 @@ MAX_DRAWN_AT_ONCE = 1000  # robots of a team that is drawn anew as a whole until
 
 
 class Swarm:
-    """B missions that differ in their seed only.
+    """B missions that differ in their seed only: robots, radio and buffers, window by window.
 
-    A mission's course depends on its own seed, not on the missions next to it.
+    A mission's course depends on its own seed, not on the missions next to it. In each window the
+    policy decides, the robots move, and then they talk.
+
+    Args:
+        mission: The numbers that all missions share.
+        seeds: One integer of 0 or more for each mission.
+        channel: Who decodes whom, as an object or `module:Name`; None is the mission's own.
+        controller: What drives the robots; None is the task's own.
+        scene: A function that adds obstacles, the same in all missions; None adds none but those
+            of the mission's arena.
+        num_threads: Threads of MuJoCo, from 1 to 1024.
+
+    Attributes:
+        states: Where the robots truly are, [B N 2] each, and who is active.
+        buffers: What the robots know; entry `[b, i, j]` is what i knows about j.
+        views: The same as robots see it: read only, with the clock and the last packets.
+        now: t on the synchronised clock, [B] [windows].
+        phases: Whom each robot addressed and decoded, in each slot of the last window.
+        talk: How the robots talk over the channel: what `talk_over` chose.
+
+    Raises:
+        ValueError: Without seeds, for a number of threads out of range, or if no connected team
+            could be drawn or the scene changed the robots.
+        TypeError: For what is no mission, or cannot be called.
+
+    Example:
+        >>> swarm = Swarm(paper("flocking"), [1, 2])
+        >>> swarm.start(make_policy("tdma", swarm.mission))
+        >>> costs = swarm.step()
+        >>> costs.age_windows.shape
+        (2,)
     """
 
     def __init__(
@@ -55,13 +86,7 @@ class Swarm:
         scene: str | Scene | None = None,
         num_threads: int = 1,
     ) -> None:
-        """Place the robots and start all missions, each from its own seed.
-
-        Channel, controller and scene are objects or `module:Name`; unless given, they are the
-        mission's own, and no obstacles are added. All missions share a scene. The threads are
-        MuJoCo's. Raises ValueError without seeds, or if no connected team could be drawn or the
-        scene changed the robots; TypeError for what is no mission, or cannot be called.
-        """
+        """Place the robots and start all missions, each from its own seed."""
         check_kind("mission", mission, Mission, 'paper("flocking")')
         own = Components(channel=channel, controller=controller, scene=scene).made(mission)
         check_seeds(seeds)
@@ -70,49 +95,85 @@ class Swarm:
             raise ValueError(f"num_threads must be a whole number {limits}, not {num_threads!r}")
         self.mission = mission
         self.scene = own.scene
+        self._num_missions = len(seeds)
         self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
+
+        # The channel that packets take, and what robots and a centre know of it.
         radio = mission_radio(mission, self._physics.obstacles, own.channel)
-        self.channel, self.belief, self.truth = radio
+        self.channel = radio.channel
+        self.belief = radio.belief
+        self.truth = radio.truth
+
         is_tasks = own.controller is None
         self.controller: Controller = controller_of(mission) if is_tasks else own.controller
         self._controller_is_ours = is_ours(self.controller)
         self._costed = costed(self.controller)
-        self._num_missions = len(seeds)
         self.restart(seeds)
 
     def restart(self, seeds: Sequence[int]) -> None:
         """Start all missions anew, as many as before; a policy must then be started, too.
 
-        Raises ValueError as the constructor does.
+        Args:
+            seeds: One integer of 0 or more for each mission.
+
+        Raises:
+            ValueError: If there are not as many seeds as before, or if no connected team could be
+                drawn.
         """
         check_seeds(seeds, self._num_missions)
-        self._rngs, mission = streams_of(seeds), self.mission
+        self._rngs = streams_of(seeds)
+        self._start_components()
+        self._place_robots()
+        self._start_clock()
+        self._empty_buffers()
+        self._policy: CentralisedPolicy | DecentralisedPolicy | None = None
+
+    def _start_components(self) -> None:
+        """Let the controller and the channel forget earlier missions, if they remember any."""
         # Before the robots are placed, as a channel is asked which teams it connects.
+        num_robots = self.mission.num_robots
         if isinstance(self.controller, Started):
-            self.controller.start(mission.num_robots, self._rngs.motion)
+            self.controller.start(num_robots, self._rngs.motion)
         if isinstance(self.channel, Started):
-            self.channel.start(mission.num_robots, self._rngs.channel)
-        position_m = [self._place(b, rng) for b, rng in enumerate(self._rngs.placement)]
-        velocity_mps = [initial_velocity(mission, rng) for rng in self._rngs.placement]
+            self.channel.start(num_robots, self._rngs.channel)
+
+    def _place_robots(self) -> None:
+        """Draw where the robots begin, how fast, who will fail, and errors of localisation."""
+        mission, rngs = self.mission, self._rngs
+        position_m = [self._place(b, rng) for b, rng in enumerate(rngs.placement)]
+        velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
-        self._survivors = draw_survivors(mission, self._rngs.failures)
-        self.now = np.zeros(len(seeds))  # t [windows]
-        room = fitting(packet_of(mission), mission, "T, M and P").num_entries
-        self.buffers: Buffers = with_room(empty_buffers(len(seeds), mission.num_robots), room)
-        is_exact = mission.position_noise_m == 0.0
-        self._noise = None if is_exact else Localisation(mission, self._rngs.localisation)
-        states = self._noise.observed(self.states) if self._noise else self.states
+        self._survivors = draw_survivors(mission, rngs.failures)
+        self._noise = None
+        if mission.position_noise_m > 0.0:
+            self._noise = Localisation(mission, rngs.localisation)
+
+    def _start_clock(self) -> None:
+        """Set the clock to the start, when nobody has said anything yet."""
+        self.now = np.zeros(self._num_missions)  # t [windows]
+        self.phases: tuple[Phase, ...] = ()
+        self.is_broadcast = False  # whether the last window's packets were for everyone (IV-C)
+
+    def _empty_buffers(self) -> None:
+        """Let the robots know themselves, and, where that is granted, each other's first states."""
+        mission = self.mission
+        self.buffers: Buffers = empty_buffers(self._num_missions, mission.num_robots)
+        self._give_room(fitting(packet_of(mission), mission, "T, M and P").num_entries)
+        self._read_only = self.buffers.read_only()
+        states = self._observed(self.states)
         observe_self(self.buffers, states, self.now)
         if mission.grants("start"):
             grant_start(self.buffers, states)
-        self.phases: tuple[Phase, ...] = ()
-        self.is_broadcast = False  # whether the last window's packets were for everyone (IV-C)
-        self._read_only = self.buffers.read_only()
-        self._policy: CentralisedPolicy | DecentralisedPolicy | None = None
+
+    def _give_room(self, num_entries: int) -> None:
+        """Let packets hold this many entries at most, and choose how robots talk by that."""
+        self.buffers = with_room(self.buffers, num_entries)
+        self.talk = talk_over(self.channel, self.buffers)
 
     def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
-        mission, composed = self.mission, self.truth.channel
+        mission = self.mission
+        composed = self.truth.channel
         has_obstacles = self._physics.obstacles is not None
         return connected_positions(
             num_robots=mission.num_robots,
@@ -127,7 +188,8 @@ class Swarm:
     def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
         is_blocked = np.zeros(len(position_m), dtype=bool)
-        if (obstacles := self._physics.obstacles) is not None:
+        obstacles = self._physics.obstacles
+        if obstacles is not None:
             is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, obstacles)
         if self.mission.collide:
             apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
@@ -155,7 +217,12 @@ class Swarm:
     def start(self, policy: Policy) -> None:
         """Fly a policy from now on, with new random streams and all else forgotten.
 
-        Raises ValueError if its packets never fit into a slot, and TypeError if it is no policy.
+        Args:
+            policy: Made for this mission, as by `make_policy`.
+
+        Raises:
+            ValueError: If its packets never fit into a slot.
+            TypeError: If it is no policy.
         """
         check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
         check_parameters(policy)
@@ -172,13 +239,15 @@ class Swarm:
         else:
             raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
         policy.start(self.mission.num_robots, self._rngs.policy)
-        self.buffers = with_room(self.buffers, packet.num_entries)
-        self._policy, self._window = policy, policy.window(self.mission)
+        self._give_room(packet.num_entries)
+        self._policy = policy
+        self._window = policy.window(self.mission)
         self._policy_is_ours = is_ours(policy)
 
     def decide(self) -> Int[np.ndarray, "B N"]:
         """Return whom each robot addresses next, by the policy that was started."""
-        policy, is_trusted = self.policy, self._policy_is_ours
+        policy = self.policy
+        is_trusted = self._policy_is_ours
         views = self.views if is_trusted else self.views.copy()
         if isinstance(policy, CentralisedPolicy):
             return policy.recipients(views, self._states_for(is_trusted))
@@ -188,13 +257,25 @@ class Swarm:
         """Move the robots through one window, by their controller and the physics."""
         wanted_mps2 = self.controller(self._read_only, self._states_for(self._controller_is_ours))
         states = self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
+        return self._observed(states)
+
+    def _observed(self, states: RobotStates) -> RobotStates:
+        """Return the states with what robots observe of themselves, a window after the last."""
         return states if self._noise is None else self._noise.observed(states)
 
     def step(self, policy: Policy | None = None) -> WindowCosts:
         """Fly one window: the policy decides, the robots move, then they talk.
 
-        A policy that is new to these missions is started; None is the one that was started.
-        Raises as `start` does, and ValueError if none was started.
+        Args:
+            policy: If it is new to these missions, it is started; None is the one that was started.
+
+        Returns:
+            What the window cost, in every mission.
+
+        Raises:
+            ValueError: If no policy was started, or one decided on what is no robot; and as
+                `start` does.
+            TypeError: As `start` does.
         """
         if policy is not None and policy is not self._policy:
             self.start(policy)
@@ -202,9 +283,16 @@ class Swarm:
         return self._play(self._window, self.decide)
 
     def step_with_recipients(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
-        """Fly one window of Alg. 1 with these recipients; itself is silence.
+        """Fly one window of Alg. 1 with these recipients.
 
-        Raises ValueError, before anything moves, unless they are one robot per robot.
+        Args:
+            recipient: Whom each robot addresses, [B N], from 0 to N - 1; itself is silence.
+
+        Returns:
+            What the window cost, in every mission.
+
+        Raises:
+            ValueError: Unless they are one robot per robot; then nothing has moved.
         """
         request_response = RequestResponse(silence_is_attempt=self.mission.silence_is_attempt)
         return self._play(request_response, lambda: recipient)
@@ -216,12 +304,13 @@ class Swarm:
     def _play(
         self, window: WindowProtocol, decide: Callable[[], Int[np.ndarray, "B N"]]
     ) -> WindowCosts:
-        """Fly one window of this protocol."""
-        start, self.is_broadcast = self.now, window.is_broadcast
+        """Fly one window of this protocol: what fails, decisions, motion, packets, costs."""
+        start = self.now
+        self.is_broadcast = window.is_broadcast
         decide_after = partial(self._decide_after, decide, start)
         if self._survivors is not None and start[0] == self.mission.failure_window:
             self._physics.deactivate(self._survivors)
-        self.phases = window(self.buffers, decide_after, self.move, self.channel, start)
+        self.phases = window(self.buffers, decide_after, self.move, self.talk, start)
         self.now = start + 1.0
         return window_costs(
             self.buffers,
@@ -241,7 +330,8 @@ class Swarm:
     ) -> np.ndarray:
         """Return the recipients in the slot after these."""
         if phases:  # a later slot is decided by its own clock, and knows the earlier one
-            self.phases, self.now = phases, start + len(phases) * SLOT_WINDOWS
+            self.phases = phases
+            self.now = start + len(phases) * SLOT_WINDOWS
         recipient = np.asarray(decide())
         check_robots("recipient", recipient, self.buffers.shape, may_broadcast=self.is_broadcast)
         return recipient

@@ -11,7 +11,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import team_views
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import LocalViews, window
+from swarm_mj.protocol.window import LocalViews, broadcast, window
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -67,7 +67,7 @@ def flooded_team(mission: Mission, seed: int) -> Team:
     for _ in range(2 * rng.integers(0, 10)):
         speaks = rng.random(len(robots)) < 0.2
         anyone = rng.integers(0, len(robots), len(robots))
-        window(buffers, states, np.where(speaks, anyone, robots)[None], radio, now, 1)
+        broadcast(buffers, states, np.where(speaks, anyone, robots)[None], radio, now)
         now = now + SLOT_WINDOWS
     return Team(
         radio=radio, position_m=position_m, timestamp=buffers.timestamp[0], now=float(now[0])

@@ -6,10 +6,12 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper, reference
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol import window
-from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol import compiled_window, window
+from swarm_mj.protocol.buffers import BROADCAST, Buffers, empty_buffers
 from swarm_mj.radio.free_space import FreeSpaceRadio
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
 
 SIZE = {"num_robots": 9, "num_windows": 30}
@@ -31,10 +33,9 @@ class OtherRadio(FreeSpaceRadio):
 
 def swarms(mission):
     """Two of the same missions, the second with a radio that nothing is compiled for."""
-    compiled, readable = Swarm(mission, [3, 4]), Swarm(mission, [3, 4])
+    compiled = Swarm(mission, [3, 4])
     numbers = {spec.name: getattr(compiled.channel, spec.name) for spec in fields(FreeSpaceRadio)}
-    readable.channel = OtherRadio(**numbers)
-    return compiled, readable
+    return compiled, Swarm(mission, [3, 4], channel=OtherRadio(**numbers))
 
 
 def arrays_of(swarm, costs):
@@ -70,17 +71,51 @@ def test_random_talk_is_the_same(name):
     assert num_decoded > 0
 
 
-def test_only_the_papers_radio_is_compiled_and_only_for_whole_packets(monkeypatch):
-    """Over another channel, and where a slot is too short, the readable window is played."""
-    played = []
-    noted = window.record_attempt
-    note = lambda *given, **how: played.append(1) or noted(*given, **how)  # noqa: E731
-    monkeypatch.setattr(window, "record_attempt", note)
+def random_states(rng, num_missions, num_robots, *, fails):
+    """Robots anywhere in a square of 300 m, some of which have failed if any may."""
+    position_m, velocity_mps = rng.uniform(-150.0, 150.0, (2, num_missions, num_robots, 2))
+    is_active = rng.random((num_missions, num_robots)) < 0.8 if fails else None
+    return RobotStates(position_m=position_m, velocity_mps=velocity_mps, is_active=is_active)
+
+
+@pytest.mark.parametrize("half_duplex", ["strict", "eavesdroppers"])
+@pytest.mark.parametrize("silence_is_attempt", [False, True])
+@pytest.mark.parametrize("fails", [False, True])
+@pytest.mark.parametrize("seed", range(4))
+def test_random_windows_and_broadcasts_leave_the_same_buffers(
+    seed, fails, silence_is_attempt, half_duplex
+):
+    """Any recipients, BROADCAST among them, in turn in windows of requests and in broadcasts."""
+    rng, now = np.random.default_rng(seed), np.zeros(3)
+    num_robots = int(rng.integers(2, 12))
+    radio = radio_of(paper("stationary", num_robots=num_robots, half_duplex=half_duplex))
+    ours, theirs = empty_buffers(3, num_robots), empty_buffers(3, num_robots)
+    how = {"silence_is_attempt": silence_is_attempt}
+    for _ in range(12):
+        states = random_states(rng, 3, num_robots, fails=fails)
+        recipient = rng.integers(BROADCAST, num_robots, (3, num_robots))
+        recipient = np.where(rng.random(recipient.shape) < 0.5, recipient, np.arange(num_robots))
+        given = recipient.copy()
+        phases = [
+            compiled_window.window(ours, states, recipient, radio, now, **how),
+            window.window(theirs, states, recipient, radio, now, **how),
+        ]
+        now = now + 1.0
+        assert all(equal(*(sum(each, ()) for each in phases)))
+        slots = [
+            compiled_window.broadcast(ours, states, recipient, radio, now, **how),
+            window.broadcast(theirs, states, recipient, radio, now, **how),
+        ]
+        now = now + 0.5
+        assert all(equal(*slots))
+        assert all(
+            equal(*([vars(known)[name] for name in vars(known)] for known in (ours, theirs)))
+        )
+        np.testing.assert_array_equal(recipient, given)  # neither writes its arguments
+
+
+def test_the_radio_compiled_here_is_that_of_the_readable_window():
+    """Else both of `swarms` would fly the same implementation."""
     compiled, readable = swarms(MISSIONS["paper"])
-    compiled.step(make_policy("tdma", compiled.mission))
-    assert len(played) == 0
-    readable.step(make_policy("tdma", readable.mission))
-    assert len(played) == 2  # broadcasts
-    short = Swarm(paper("random-walk", bit_rate=6000.0, **SIZE), [3])
-    short.step(make_policy("round-robin", short.mission))
-    assert len(played) == 3  # a request and its response
+    assert compiled.talk.window.func is compiled_window.window
+    assert readable.talk.window.func is window.window

@@ -11,10 +11,12 @@ from hypothesis import strategies as st
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.talk import talk_over
 from swarm_mj.protocol.window import (
     DoubleBroadcast,
     LocalViews,
     RequestResponse,
+    broadcast,
     channel_at,
     window,
 )
@@ -144,7 +146,7 @@ def test_alg1_silence_counts_as_attempt_when_told_so():
     recipient, now = np.array([[1, 1]]), np.array([0.0])
     window(buffers, standing(2), recipient, to_nobody, now, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 0.5], [0.0, 0.5]]
-    window(buffers, standing(2), recipient, to_nobody, now + 2.5, 1, silence_is_attempt=True)
+    broadcast(buffers, standing(2), recipient, to_nobody, now + 2.5, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 3.0], [0.0, 3.0]]
 
 
@@ -162,7 +164,7 @@ def play_once(protocol, buffers, recipients, num_robots):
         asked.append(phases)
         return np.array([recipients[len(asked) - 1]])
 
-    phases = protocol(buffers, decide, move, to_everyone, np.zeros(1))
+    phases = protocol(buffers, decide, move, talk_over(to_everyone, buffers), np.zeros(1))
     return phases, asked, moves
 
 

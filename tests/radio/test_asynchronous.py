@@ -6,8 +6,8 @@ import pytest
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.asynchronous_window import window
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.window import window
 from swarm_mj.radio.asynchronous import AIRTIME, GUARD, AsynchronousChannel, decode_overlapping
 from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.mission_radio import mission_radio, radio_of

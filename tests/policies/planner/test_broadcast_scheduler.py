@@ -14,7 +14,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner.broadcast_scheduler import Problem, schedule_slot
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import window
+from swarm_mj.protocol.window import broadcast
 from swarm_mj.radio.links import KNOWN, Links, links_between, lone_probabilities
 from swarm_mj.radio.mission_radio import radio_of
 
@@ -58,7 +58,7 @@ def really(team, speaks):
     for p, row in enumerate(speaks):
         recipient = np.where(row, (robots + 1) % team.num_robots, robots)[None]
         now = np.array([team.now + p * SLOT_WINDOWS])
-        window(buffers, states, recipient, team.radio, now, 1)
+        broadcast(buffers, states, recipient, team.radio, now)
         after.append(buffers.timestamp[0].copy())
     return np.array(after)
 
