@@ -33,7 +33,7 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system import needs
 from swarm_mj.system.compiled import compiling
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
-from swarm_mj.system.fields import check_kind, check_names
+from swarm_mj.system.fields import check_kind, check_names, former_names
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import Needs, check_fits, free_memory, in_gb, memory_errors
 from swarm_mj.system.packages import commit, version
@@ -129,14 +129,13 @@ def mission_of(
     parameters = inspect.signature(function).parameters.values()
     keywords = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     names = [spec.name for spec in fields(Mission) if spec.name != "task"]
-    check_names(f"swarm_mj.{function.__name__}", mission_fields, [*names, *keywords])
-    if not isinstance(task, Mission):
-        return make_mission(**({} if task is None else {"task": task}), **mission_fields)
-    if mission_fields:
+    known = [*names, *keywords]
+    check_names(f"swarm_mj.{function.__name__}", mission_fields, known, former_names(Mission))
+    if isinstance(task, Mission) and mission_fields:
         given = ", ".join(f"{name}={value!r}" for name, value in mission_fields.items())
         rule = f"you gave a finished mission, so {', '.join(mission_fields)} must be part of it"
         raise TypeError(f"{rule}: dataclasses.replace(mission, {given})")
-    return task
+    return make_mission(task, **mission_fields)
 
 
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:

@@ -7,8 +7,8 @@ from typing import Any
 
 import msgspec
 
-from swarm_mj.mission.specification import NOTHING
-from swarm_mj.system.fields import FORMER_NAMES
+from swarm_mj.mission.specification import NOTHING, Mission
+from swarm_mj.system.fields import former_names
 from swarm_mj.system.reading import read_json, read_rows
 from swarm_mj.system.writing import write_csv
 
@@ -150,7 +150,8 @@ def write_results(path: Path, results: Iterable[Result]) -> None:
 
 
 def _result(place: str, row: dict[str, str]) -> Result:
-    cells = {FORMER_NAMES.get(name, name): cell or None for name, cell in row.items()}
+    present = former_names(Mission)
+    cells = {present.get(name, name): cell or None for name, cell in row.items()}
     try:
         return msgspec.convert(cells, Result, strict=False)
     except msgspec.ValidationError as error:
