@@ -16,7 +16,8 @@ from notebook_page import page_of
 
 import swarm_mj
 from swarm_mj.mission import Mission
-from swarm_mj.system.fields import as_typed, range_of
+from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.system.fields import about_of, as_typed, range_of
 
 ROOT = Path(__file__).parent.parent
 PAGES = {  # where they are on the site, and in the repository
@@ -70,14 +71,17 @@ def mission_fields() -> str:
     """Return the fields of `Mission` as a table."""
     rows = ["| field | default | what it is | allowed | source |", "|---|---|---|---|---|"]
     for spec in fields(Mission):
-        known = spec.metadata
-        if "choices" in known:
-            allowed = ", ".join(f"`{choice}`" for choice in known["choices"])
+        about = about_of(spec)
+        if about.choices:
+            allowed = ", ".join(f"`{choice}`" for choice in about.choices)
+        elif about.has_range:
+            allowed = range_of(spec)
+        elif spec.name == "arena":
+            allowed = ", ".join(f"`{arena}`" for arena in ARENAS) + ", or an MJCF file"
         else:
-            allowed = range_of(spec) if "low" in known else "`True`, `False`"
-        meaning = known.get("help") or known.get("label") or spec.name.replace("_", " ")
-        source = known.get("source", "authors' code")
-        cells = (f"`{spec.name}`", f"`{as_typed(spec.default)}`", meaning, allowed, source)
+            allowed = "`True`, `False`"
+        meaning = about.help or about.label or spec.name.replace("_", " ")
+        cells = (f"`{spec.name}`", f"`{as_typed(spec.default)}`", meaning, allowed, about.source)
         rows.append(f"| {' | '.join(cells)} |")
     return "\n".join(rows)
 

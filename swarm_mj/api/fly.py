@@ -16,7 +16,7 @@ from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.components import Components
-from swarm_mj.system.fields import check_kind, check_names
+from swarm_mj.system.fields import check_kind, check_names, former_names
 from swarm_mj.system.needs import check_fits
 from swarm_mj.system.terminal import quiet_console
 
@@ -116,16 +116,13 @@ def mission_of(
     parameters = inspect.signature(function).parameters.values()
     keywords = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     names = [spec.name for spec in fields(Mission) if spec.name != "task"]
-    check_names(f"swarm_mj.{function.__name__}", mission_fields, [*names, *keywords])
-    if task is None:
-        return make_mission(**mission_fields)
-    if not isinstance(task, Mission):
-        return make_mission(task=task, **mission_fields)
-    if mission_fields:
+    known = [*names, *keywords]
+    check_names(f"swarm_mj.{function.__name__}", mission_fields, known, former_names(Mission))
+    if isinstance(task, Mission) and mission_fields:
         given = ", ".join(f"{name}={value!r}" for name, value in mission_fields.items())
         rule = f"you gave a finished mission, so {', '.join(mission_fields)} must be part of it"
         raise TypeError(f"{rule}: dataclasses.replace(mission, {given})")
-    return task
+    return make_mission(task, **mission_fields)
 
 
 def _policy_of(

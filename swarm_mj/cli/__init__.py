@@ -9,7 +9,6 @@ import importlib
 import os
 import signal
 import sys
-import tomllib
 from collections.abc import Callable, Mapping, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -22,12 +21,27 @@ from swarm_mj.system.streams import lasting_streams
 
 NAME = "swarm-mj"
 WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
-_TEXTS = tomllib.loads(Path(__file__).with_name("commands.toml").read_text("utf-8"))
-# Each is a module here: `fly` holds its options, `FlyOptions`, and its action, `run`.
-COMMANDS: dict[str, str] = _TEXTS["commands"]
-BEGINNING: dict[str, str] = _TEXTS["begin_with"]
-EPILOGS: dict[str, str] = _TEXTS["epilogs"]
-OPTIONS: dict[str, dict[str, str]] = _TEXTS["options"]  # what they mean, by command
+# Each is a module here: `fly` holds its options, `FlyOptions`, and its action, `run`. They are not
+# imported for the overview, which has to be quick.
+COMMANDS: dict[str, str] = {
+    "fly": "Fly one mission and record its replay.",
+    "policies": "List the communication policies: what each knows and sends.",
+    "evaluate": "Fly policies over the same missions and say where they stand.",
+    "study": "Fly a study that is a file, or compare two results.",
+    "train": "Train a communication policy by PPO.",
+    "curves": "Show the learning curves of training runs.",
+    "figures": "Draw the paper's figures from results.",
+    "replay": "Open a replay in rerun's viewer, or make a video or a picture of it.",
+    "scene": "Write the scene of a mission as one MJCF file.",
+    "doctor": "Say what works on this machine, and how to mend what does not.",
+    "bench": "Time the simulation and its parts.",
+}
+BEGINNING: dict[str, str] = {  # the overview's "begin with"
+    "fly": "a flock of 40 robots flies 50 s; it records a replay",
+    "replay FILE": "opens that replay",
+    "policies": "what you can give to --policy, and what each one knows",
+    "evaluate": "flies several policies on the same missions",
+}
 
 
 def parse(arguments: Sequence[str]) -> tuple[Any, Any]:

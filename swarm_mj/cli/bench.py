@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli import OPTIONS, bench_decisions
+from swarm_mj.cli import bench_decisions
 from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
 from swarm_mj.policies.registry import POLICIES, SHIPPED
@@ -20,7 +20,6 @@ from swarm_mj.system.terminal import num_cores, plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
-HELP = OPTIONS["bench"]
 BUSY = 0.3  # the spread from which on numbers say little
 LEGEND = """
 window: 100 ms of a mission. The indented rows below the line are its parts.
@@ -41,11 +40,22 @@ class BenchOptions:
     missions: tuple[int, ...] = setting((1, 32, 256), "missions side by side", low=1, high=10_000)
     threads: int = setting(1, "threads of MuJoCo and torch", low=1, high=256)
     seconds: float = setting(2.0, "a measurement's time, about", unit="s", low=0.1, high=600.0)
-    episodes: int = setting(100, HELP["episodes"], low=0, high=10_000)
+    episodes: int = setting(
+        100,
+        "missions of each baseline in the evaluation that is timed; 0 leaves it out",
+        low=0,
+        high=10_000,
+    )
     jobs: int = setting(2, "processes of that evaluation", low=1, high=256)
     no_learning: bool = setting(False, "leave out the networks and the training")
-    robots: tuple[int, ...] = setting((), HELP["robots"], low=2, high=10_000, shown="none")
-    json: Path | None = output_option(None, HELP["json"], metavar="FILE.json")
+    robots: tuple[int, ...] = setting(
+        (), "measure teams of these sizes instead", low=2, high=10_000, shown="none"
+    )
+    json: Path | None = output_option(
+        None,
+        "write what is printed, with unrounded values, and the processor's model",
+        metavar="FILE.json",
+    )
     plot: Path | None = output_option(None, "draw these teams", metavar="FILE.png|.svg|.pdf")
 
 

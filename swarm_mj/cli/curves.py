@@ -6,7 +6,6 @@ from pathlib import Path
 
 import numpy as np
 
-from swarm_mj.cli import OPTIONS
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, TrainingRun, read_curve, read_run
@@ -25,7 +24,9 @@ class CurvesOptions:
     """The options of `swarm-mj curves`."""
 
     run: tuple[Path, ...] = setting(
-        help=OPTIONS["curves"]["run"], metavar="RUN", is_positional=True
+        help="folders that `swarm-mj train` wrote; those that differ only in their seed are a line",
+        metavar="RUN",
+        is_positional=True,
     )
     plot: Path | None = setting(None, "draw the curves", metavar="FILE.png|.svg|.pdf")
     force: bool = setting(False, "replace an existing figure")

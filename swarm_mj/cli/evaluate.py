@@ -12,7 +12,6 @@ from typing import Any, ClassVar
 from rich.console import Console
 
 from swarm_mj.api.evaluate import study_needs
-from swarm_mj.cli import EPILOGS, OPTIONS
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.evaluation import flying
@@ -33,19 +32,30 @@ from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, owned
 
-HELP = OPTIONS["evaluate"]
-
 
 @dataclass(frozen=True, kw_only=True)
 class StudyFlags(EngineOptions):
     """How a study is flown, and where its results go."""
 
-    EPILOG: ClassVar = EPILOGS["evaluate"]
-    json: Path | None = common_output(None, HELP["json"], metavar="FILE.json")
-    csv: Path | None = common_output(None, HELP["csv"], metavar="FILE.csv")
-    parquet: Path | None = output_option(None, HELP["parquet"], metavar="FILE.parquet")
-    plot: Path | None = common_output(None, HELP["plot"], metavar="FILE.png|.svg|.pdf")
-    wide: bool = common_output(False, HELP["wide"])
+    EPILOG: ClassVar = (
+        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (with --json, "
+        "--csv or --parquet, --resume continues)."
+    )
+    json: Path | None = common_output(
+        None, "write all figures and each mission's costs", metavar="FILE.json"
+    )
+    csv: Path | None = common_output(
+        None, "write all figures, one row a result", metavar="FILE.csv"
+    )
+    parquet: Path | None = output_option(
+        None, "write each mission's costs, one row a mission", metavar="FILE.parquet"
+    )
+    plot: Path | None = common_output(
+        None, "draw the policies' ages, the lowest first", metavar="FILE.png|.svg|.pdf"
+    )
+    wide: bool = common_output(
+        False, "print more columns: velocity variance, quantiles, bytes, published values"
+    )
     force: bool = output_option(False, "replace existing results and progress")
     yes: bool = output_option(False, YES)
     resume: bool = output_option(False, "continue where an interruption broke off")

@@ -5,7 +5,6 @@ from pathlib import Path
 
 from rich.console import Console
 
-from swarm_mj.cli import OPTIONS
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import read_results
@@ -15,7 +14,6 @@ from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
-HELP = OPTIONS["figures"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -23,14 +21,21 @@ class FiguresOptions:
     """The options of `swarm-mj figures`."""
 
     results: tuple[Path, ...] = setting(
-        help=HELP["results"], metavar="RESULTS.csv", is_positional=True
+        help="files of one preset that `swarm-mj evaluate --csv` wrote",
+        metavar="RESULTS.csv",
+        is_positional=True,
     )
     out: Path = setting(help="where to write", metavar="DIR")
     figure: tuple[str, ...] = setting(
         FIGURES, "which to draw", choices=FIGURES, shown="all that have points"
     )
     format: tuple[str, ...] = setting(("svg", "png"), "of the files", choices=FORMATS)
-    policy: tuple[str, ...] = setting((), HELP["policy"], metavar="NAME", shown="all")
+    policy: tuple[str, ...] = setting(
+        (),
+        "draw these methods only: policies of the results, or a GNN's name among the published",
+        metavar="NAME",
+        shown="all",
+    )
     force: bool = setting(False, "replace existing figures")
     yes: bool = setting(False, f"ignored: drawing needs little memory; removed in {GONE_IN}")
     flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)

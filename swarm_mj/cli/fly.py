@@ -12,7 +12,6 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.flight import Flight, flight_needs, fly_mission
-from swarm_mj.cli import EPILOGS
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.mission import Mission
@@ -37,7 +36,10 @@ LARGE = 80  # robots, beyond which a plan takes long, and age-gain-csma has the 
 class FlyOptions(PolicyOptions):
     """The options of `swarm-mj fly`."""
 
-    EPILOG: ClassVar = EPILOGS["fly"]
+    EPILOG: ClassVar = (
+        "Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 interrupted (what was flown is "
+        "recorded)."
+    )
     policy: str = common_setting(
         "planner", f"{NAMES}, a learned policy's directory or file, or module:Name of your own"
     )

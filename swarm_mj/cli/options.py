@@ -9,19 +9,23 @@ import sys
 import textwrap
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from copy import copy
-from dataclasses import MISSING, Field, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, NoReturn, get_origin
+from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.system import fields as settings
 from swarm_mj.system.exit_codes import BAD_INPUT
+from swarm_mj.system.fields import About, about_of
+
+Value = TypeVar("Value")
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 output_option = partial(settings.setting, group="output")  # under this heading of the help
 common_output = partial(output_option, is_common=True)
+NESTED = "nested"  # the key of a field's metadata that several options fill
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
 
@@ -89,21 +93,42 @@ class _Formatter(argparse.HelpFormatter):
         return super()._format_args(action, default_metavar or "")
 
 
+@dataclass(frozen=True)
+class Option:
+    """A field as an option of the command line."""
+
+    spec: Field[Any]
+    about: About  # what the help says of it: the field's own, unless the command says otherwise
+    place: str  # what its value is called until it is built into the command's dataclass
+    is_many: bool = False  # whether it takes several values
+    is_nested: bool = False  # whether it is part of another field, which does without it
+
+    @property
+    def is_required(self) -> bool:
+        """True if its flag must be typed."""
+        can_lack = self.is_nested or self.about.is_positional
+        return not can_lack and self.spec.default is MISSING
+
+
+@dataclass(frozen=True)
+class Nested:
+    """What fills a field by several options."""
+
+    options: Callable[[], Iterable[Option]]
+    build: Callable[[dict[str, Any]], Any]
+
+
 def nested(
-    options: Callable[[], Iterable[Field[Any]]], build: Callable[[dict[str, Any]], Any]
-) -> settings.FieldOf:
-    """Return a field that several options fill; `build` makes its value of all values given."""
-    return field(metadata={"options": options, "build": build})
+    options: Callable[[], Iterable[Option]], build: Callable[[dict[str, Any]], Value]
+) -> Value:
+    """Return a field that several options fill; type checkers take it for what `build` makes.
 
-
-def nested_option(spec: Field[Any], place: str, **about: Any) -> Field[Any]:
-    """Return a field of a nested dataclass as an option; its value is parsed as `place`.
-
-    `about` overrides the field's own metadata; `is_many` has it take several values.
+    Args:
+        options: Makes the options.
+        build: Makes the field's value of all values given, by their places.
     """
-    option = copy(spec)
-    option.metadata = MappingProxyType({**spec.metadata, "place": place, **about})
-    return option
+    filled: Any = field(metadata={NESTED: Nested(options, build)})
+    return filled
 
 
 def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary: str) -> object:
@@ -119,18 +144,24 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
     given |= {name: tuple(x) if isinstance(x, list) else x for name, x in parsed.items()}
     specs = fields(kind)
     values = {spec.name: given[spec.name] for spec in specs if spec.name in given}
-    built = (spec for spec in specs if "build" in spec.metadata)
-    options = kind(**values, **{spec.name: spec.metadata["build"](given) for spec in built})
+    for spec in specs:
+        if filled := _nested_in(spec):
+            values[spec.name] = filled.build(given)
+    options = kind(**values)
     settings.check(options)
     return options
 
 
 def flags_of(spec: Field[Any]) -> tuple[str, ...]:
     """Return the flag of a field, `--windows` of `num_windows`, then those of earlier releases."""
+    about = about_of(spec)
     name = spec.name.removeprefix("num_").removeprefix("is_")
-    former = (old for old, present in settings.FORMER_NAMES.items() if present == spec.name)
-    flags = ["--" + each.replace("_", "-") for each in (name, *former)]
-    return (spec.metadata.get("flag", flags[0]), *flags[1:])
+    former = [_flag(each) for each in about.former]
+    return (about.flag or _flag(name), *former)
+
+
+def _flag(name: str) -> str:
+    return "--" + name.replace("_", "-")
 
 
 def _check_names(arguments: Sequence[str]) -> None:
@@ -148,12 +179,9 @@ def _check_names(arguments: Sequence[str]) -> None:
 
 def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
     options = list(_options_of(kind))
-    positional = [spec for spec in options if spec.metadata.get("is_positional")]
-    needed = [_metavar(s) if s.default is MISSING else f"[{_metavar(s)}]" for s in positional]
-    needed += [f"{flags_of(spec)[0]} {_metavar(spec)}" for spec in options if _is_required(spec)]
     parser = Parser(
         prog=prog,
-        usage=" ".join([prog, *needed, "[OPTIONS]"]),
+        usage=_usage(prog, options),
         description=summary,
         epilog=getattr(kind, "EPILOG", None),
         formatter_class=partial(_Formatter, max_help_position=26),
@@ -163,80 +191,98 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         about = "show all options and exit"
         parser.add_argument("--help-all", action=_HelpAll, nargs=0, help=about)
     groups: dict[str, Any] = {"": parser}
-    for spec in options:
-        heading = spec.metadata.get("group", "")
+    for option in options:
+        heading = option.about.group
         if heading not in groups:
             groups[heading] = parser.add_argument_group(heading)
-        _add(groups[heading], spec)
+        _add(groups[heading], option)
     parser.rare = {action: action.help for action in parser._actions if action.dest in rare}
     for action in parser.rare:
         action.help = argparse.SUPPRESS
     return parser
 
 
-def _options_of(kind: type[Any]) -> Iterator[Field[Any]]:
+def _usage(prog: str, options: Iterable[Option]) -> str:
+    """Return a command's first line of help: what stands without a flag, then what is needed."""
+    bare: list[str] = []
+    needed: list[str] = []
+    for option in options:
+        value = _metavar(option)
+        if option.about.is_positional:
+            bare.append(value if option.spec.default is MISSING else f"[{value}]")
+        elif option.is_required:
+            needed.append(f"{flags_of(option.spec)[0]} {value}")
+    return " ".join([prog, *bare, *needed, "[OPTIONS]"])
+
+
+def _options_of(kind: type[Any]) -> Iterator[Option]:
     """Yield the options of a command's dataclass: its fields, and those nested in them."""
     for spec in fields(kind):
-        if "options" in spec.metadata:
-            yield from spec.metadata["options"]()
-        elif "help" in spec.metadata:
-            yield spec
+        about = about_of(spec)
+        if filled := _nested_in(spec):
+            yield from filled.options()
+        elif about.help:
+            yield Option(spec, about, place=spec.name)
 
 
-def _rare(kind: type[Any], options: Sequence[Field[Any]]) -> frozenset[str]:
-    """Return the destinations of options that are not common, if the command says which are."""
-    if not any(spec.metadata.get("is_common") for spec in fields(kind)):
+def _nested_in(spec: Field[Any]) -> Nested | None:
+    return spec.metadata.get(NESTED)
+
+
+def _rare(kind: type[Any], options: Sequence[Option]) -> frozenset[str]:
+    """Return the places of options that are not common, if the command says which are."""
+    if not any(about_of(spec).is_common for spec in fields(kind)):
         return frozenset()
-    always = ("is_common", "is_positional")
-    return frozenset(
-        _place(spec)
-        for spec in options
-        if not (_is_required(spec) or any(spec.metadata.get(each) for each in always))
-    )
+    rare: set[str] = set()
+    for option in options:
+        is_shown = option.is_required or option.about.is_common or option.about.is_positional
+        if not is_shown:
+            rare.add(option.place)
+    return frozenset(rare)
 
 
-def _place(spec: Field[Any]) -> str:
-    return spec.metadata.get("place", spec.name)
-
-
-def _is_required(spec: Field[Any]) -> bool:
-    is_own = not {"place", "is_positional"} & spec.metadata.keys()  # what is nested has a default
-    return is_own and spec.default is MISSING
-
-
-def _add(group: argparse._ActionsContainer, spec: Field[Any]) -> None:
-    kind, about, place = settings.kind_of(spec), spec.metadata, _place(spec)
-    how: dict[str, Any] = {"help": _help(spec)}
+def _add(group: argparse._ActionsContainer, option: Option) -> None:
+    spec = option.spec
+    about = option.about
+    kind = settings.kind_of(spec)
+    flags = flags_of(spec)
+    how: dict[str, Any] = {"help": _help(option)}
     if kind is bool:
-        group.add_argument(*flags_of(spec), dest=place, action="store_true", **how)
+        group.add_argument(*flags, dest=option.place, action="store_true", **how)
         return
-    convert = about.get("convert") or CONVERT.get(about.get("unit")) or CONVERT.get(kind, kind)
-    how |= {"type": convert, "metavar": _metavar(spec)}
-    if about.get("is_many") or get_origin(spec.type) is tuple:
+    how["type"] = about.convert or CONVERT.get(about.unit) or CONVERT.get(kind, kind)
+    how["metavar"] = _metavar(option)
+    if option.is_many or get_origin(spec.type) is tuple:
         how |= {"nargs": "+", "action": "extend"}
-    if not about.get("is_positional"):
-        group.add_argument(*flags_of(spec), dest=place, required=_is_required(spec), **how)
+    if not about.is_positional:
+        group.add_argument(*flags, dest=option.place, required=option.is_required, **how)
         return
     if spec.default is not MISSING:
         how["nargs"] = "?"
-    group.add_argument(place, **how)
+    group.add_argument(option.place, **how)
 
 
-def _help(spec: Field[Any]) -> str:
+def _help(option: Option) -> str:
     """Return meaning, choices, unit, range and default."""
-    about, text = spec.metadata, spec.metadata["help"]
-    if "choices" in about:
-        text += f": {', '.join(about['choices'])}"
-    if "low" in about:
-        has_end = about["high"] < MANY
-        text += f", {settings.range_of(spec)}" if has_end else f", {about['low']} or more"
-    has_default = not any(spec.default is each for each in (MISSING, None, False, ()))
-    default = about.get("shown", settings.as_typed(spec.default) if has_default else "")
-    return (text + (f" (default: {default})" if default else "")).replace("%", "%%")
+    spec = option.spec
+    about = option.about
+    text = about.help
+    if about.choices:
+        text += f": {', '.join(about.choices)}"
+    if about.high is not None:
+        has_end = about.high < MANY
+        text += f", {settings.range_of(spec)}" if has_end else f", {about.low} or more"
+    default = about.shown
+    if default is None:
+        has_default = not any(spec.default is each for each in (MISSING, None, False, ()))
+        default = settings.as_typed(spec.default) if has_default else ""
+    if default:
+        text += f" (default: {default})"
+    return text.replace("%", "%%")
 
 
-def _metavar(spec: Field[Any]) -> str:
-    return spec.metadata.get("metavar") or METAVARS.get(settings.kind_of(spec), "VALUE")
+def _metavar(option: Option) -> str:
+    return option.about.metavar or METAVARS.get(settings.kind_of(option.spec), "VALUE")
 
 
 def _path(text: str) -> Path:

@@ -11,7 +11,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Column, Table
 
-from swarm_mj.cli.mission_options import HELP, mission_flags, one_mission
+from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
@@ -42,7 +42,12 @@ class PoliciesOptions:
     """The options of `swarm-mj policies`."""
 
     EPILOG: ClassVar = "Probabilities and bytes depend on the mission, so the options may name one."
-    name: str | None = setting(None, HELP["name"], is_positional=True, metavar="NAME")
+    name: str | None = setting(
+        None,
+        "say more of this one: a policy, where a learned one is, or module:Name of your own",
+        is_positional=True,
+        metavar="NAME",
+    )
     json: bool = common_setting(False, "print JSON in place of the table")
     mission: Mission = one_mission()
 

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING
 
 from rich.console import Console
 
-from swarm_mj.cli import OPTIONS
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.replay import view
 from swarm_mj.simulation.components import SHOWN_AS, Components
@@ -27,18 +26,28 @@ VIDEO, PICTURE = "video", "picture"  # headings of the help
 _video = partial(setting, group=VIDEO)
 OWN_TIME = f"the mission's own time, {view.LONGEST_S:g} at most"
 BARE = "the bare arena"
-HELP = OPTIONS["replay"]
 
 
 @dataclass(frozen=True, kw_only=True)
 class ReplayOptions:
     """The options of `swarm-mj replay`."""
 
-    file: tuple[Path, ...] = setting(help=HELP["file"], is_positional=True)
-    web: bool = setting(False, HELP["web"])
-    video: Path | None = setting(None, HELP["video"], group=VIDEO)
+    file: tuple[Path, ...] = setting(
+        help=".rrd files that `swarm-mj fly` recorded", is_positional=True
+    )
+    web: bool = setting(
+        False, "serve it to a browser, on this machine's loopback address only, until Ctrl-C"
+    )
+    video: Path | None = setting(
+        None,
+        "make a video instead, of one mission or of two side by side: FILE.mp4 or FILE.gif",
+        group=VIDEO,
+    )
     picture: Path | None = setting(
-        None, HELP["picture"], metavar="FILE.png|.svg|.pdf", group=PICTURE
+        None,
+        "draw the map of one window instead, for a slide",
+        metavar="FILE.png|.svg|.pdf",
+        group=PICTURE,
     )
     window: int | None = setting(
         None, "which window; 1 is the first", low=1, high=10**9, shown="the last", group=PICTURE
@@ -49,8 +58,15 @@ class ReplayOptions:
     seconds: float | None = _video(
         None, "in which the whole mission is shown", unit="s", low=0.1, high=600.0, shown=OWN_TIME
     )
-    fps: int | None = _video(None, HELP["fps"], low=1, high=60, shown="25; GIF: 15")
-    scene: str | None = _video(None, HELP["scene"], metavar=SHOWN_AS, shown=BARE)
+    fps: int | None = _video(
+        None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
+    )
+    scene: str | None = _video(
+        None,
+        "the scene of your own that the mission was flown in; of a picture, too",
+        metavar=SHOWN_AS,
+        shown=BARE,
+    )
     force: bool = _video(False, "replace an existing video or picture")
     yes: bool = _video(False, f"ignored: videos need no estimate; removed in {GONE_IN}")
 

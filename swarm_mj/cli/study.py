@@ -5,7 +5,6 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any, ClassVar, get_origin
 
-from swarm_mj.cli import EPILOGS, OPTIONS
 from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import missions_of
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
@@ -13,7 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import check_kind, check_names, did_you_mean, setting
+from swarm_mj.system.fields import check_kind, check_names, did_you_mean, former_names, setting
 from swarm_mj.system.packages import asset, need
 from swarm_mj.system.reading import read_file
 from swarm_mj.system.terminal import plain_console
@@ -26,12 +25,19 @@ TAKES = {"run": "FILE.toml", "compare": "BEFORE.parquet AFTER.parquet"}
 class StudyOptions(StudyFlags):
     """The options of `swarm-mj study`."""
 
-    EPILOG: ClassVar = f"{EPILOGS['study']} {StudyFlags.EPILOG}"
+    EPILOG: ClassVar = (
+        "FILE.toml has tables of fields: [study] (policies, episodes, seed, baseline), [mission] "
+        "(of Mission in Python; of several values, each is flown) and [missions.NAME], which adds "
+        f"missions of its own. {StudyFlags.EPILOG}"
+    )
     action: str = setting(
         help="what to do", metavar="ACTION", choices=tuple(TAKES), is_positional=True
     )
     named: tuple[str, ...] = setting(
-        help=OPTIONS["study"]["named"], metavar="FILE", is_positional=True
+        help="a study to run, FILE.toml or a shipped one's name; or two results to compare, each "
+        "written by --parquet",
+        metavar="FILE",
+        is_positional=True,
     )
 
 
@@ -81,8 +87,9 @@ def _study(tables: dict[str, Any]) -> Study:
     for name, table in tables.get("missions", {"": {}}).items():
         place = f"[missions.{name}]" if name else "[mission]"
         given = shared | _values(place, table, Mission)
+        placed = {f"mission.{field}": value for field, value in given.items()}
         try:
-            regimes += missions_of({f"mission.{each}": x for each, x in given.items()}, str)
+            regimes += missions_of(placed, called=str)
         except ValueError as error:
             raise ValueError(f"{place}: {error}") from error
     return Study(**own, regimes=tuple(dict.fromkeys(regimes)))
@@ -94,14 +101,15 @@ def _values(place: str, given: dict[str, Any], kind: type[Any]) -> dict[str, Any
     A field of several values may be given as a single text.
     """
     check_kind(place, given, dict, "num_robots = 20")
-    has_several = {spec.name: get_origin(spec.type) is tuple for spec in fields(kind)}
-    check_names(place, given, has_several)
+    types = {spec.name: spec.type for spec in fields(kind)}
+    check_names(place, given, types, former_names(kind))
     values: dict[str, Any] = {}
     for name, value in given.items():
-        if isinstance(value, list):
-            values[name] = tuple(value)
-        elif isinstance(value, str) and has_several[name]:
+        takes_many = get_origin(types[name]) is tuple
+        if takes_many and isinstance(value, str):  # one policy, say, in place of a list of one
             values[name] = (value,)
+        elif isinstance(value, list):
+            values[name] = tuple(value)
         else:
             values[name] = value
     return values

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, get_args
 
 from rich.console import Console
 
-from swarm_mj.cli import EPILOGS, OPTIONS, train_settings
+from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
@@ -28,7 +28,12 @@ from swarm_mj.system.writing import Output, check_outputs
 class TrainOptions:
     """The options of `swarm-mj train`."""
 
-    EPILOG: ClassVar = EPILOGS["train"]
+    EPILOG: ClassVar = (
+        "A run that was interrupted, or killed, goes on with --out OUT --resume and ends as if it "
+        "had not been. OUT holds policy.safetensors, the one to fly; settings.json, curve.csv, "
+        "tensorboard and checkpoint.pt. Exit codes: 0 done, 1 the machine failed, 2 bad input, 130 "
+        "interrupted (--resume goes on)."
+    )
     out: Path = setting(help="the run's folder", metavar="runs/NAME")
     resume: bool = common_setting(False, "go on with the run in OUT")
     budget: int | None = same_as(Limits, "decisions")
@@ -37,7 +42,8 @@ class TrainOptions:
     replay_every: int | None = same_as(Limits, "replay_every")
     device: str | None = setting(
         None,
-        OPTIONS["train"]["device"],
+        "where the networks learn: cpu, or cuda, an NVIDIA GPU; auto takes a GPU if there is one. "
+        "Missions are on the CPU",
         choices=get_args(Device),
         shown="auto, --resume: as before",
     )

@@ -10,15 +10,15 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.mission_options import COMMON, FLAGS, check_in_use
-from swarm_mj.cli.options import flags_of, nested_option
+from swarm_mj.cli.mission_options import FLAGS, about_option, check_in_use
+from swarm_mj.cli.options import Option, flags_of
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
 from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.simulation.components import GROUP, Components
-from swarm_mj.system.fields import as_typed
+from swarm_mj.system.fields import about_of, as_typed
 from swarm_mj.system.user_code import is_own
 
 PARTS = {  # the dataclasses of settings and their headings in the help, by their dotted place
@@ -28,22 +28,29 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "components.": (Components, GROUP),
     "mission.": (Mission, "missions"),
 }
-SPECS: dict[str, Field[Any]] = {
-    f"{part}{spec.name}": spec
-    for part, (owner, _) in PARTS.items()
-    for spec in fields(owner)
-    if "help" in spec.metadata and spec.name != "num_robots"  # team sizes are the run's own
-}
 
 
-def setting_options() -> Iterator[Field[Any]]:
+def _specs() -> dict[str, Field[Any]]:
+    """Return the fields that are options, by their dotted place."""
+    specs: dict[str, Field[Any]] = {}
+    for part, (owner, _) in PARTS.items():
+        for spec in fields(owner):
+            is_size = spec.name == "num_robots"  # team sizes are the run's own
+            if about_of(spec).help and not is_size:
+                specs[f"{part}{spec.name}"] = spec
+    return specs
+
+
+SPECS = _specs()
+
+
+def setting_options() -> Iterator[Option]:
     """Yield the settings as options, under a heading for each part of the settings."""
     for place, spec in SPECS.items():
         _, heading = PARTS[place.removesuffix(spec.name)]
-        about: dict[str, Any] = {"group": heading, "shown": _usual(place)}
-        if place.startswith("mission."):
-            about["is_common"] = spec.name in COMMON
-        yield nested_option(spec, place, **about)
+        about = about_option(spec) if place.startswith("mission.") else about_of(spec)
+        about = replace(about, group=heading, shown=_usual(place))
+        yield Option(spec, about, place, is_nested=True)
 
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
@@ -136,9 +143,11 @@ def _num_groups(missions: int, num_sizes: int) -> int:
 
 def _usual(place: str) -> str:
     """Return the default as text: per robot and, where it differs, per team."""
-    if "shown" in SPECS[place].metadata:
-        return SPECS[place].metadata["shown"]
-    shown, value_of = [], attrgetter(place)
+    own = about_of(SPECS[place]).shown
+    if own is not None:
+        return own
+    shown: list[str] = []
+    value_of = attrgetter(place)
     for credit in ("robot", "team"):
         missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
         usual, other = (value_of(usual_settings(credit, each, (40,))) for each in missions)

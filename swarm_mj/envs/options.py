@@ -1,7 +1,6 @@
 """Options and spaces that all environments share: what users ask for, and what they get."""
 
 import copy
-from dataclasses import replace
 from numbers import Integral
 from typing import Any
 
@@ -63,7 +62,9 @@ def make_batch(
     """
     if not isinstance(num_missions, Integral) or num_missions < 1:
         raise ValueError(f"the number of missions must be 1 or more, not {num_missions!r}")
-    mission = _mission_of(mission, preset, fields)
+    if "seed" in fields:
+        raise TypeError("seed is no option of an environment; give it to reset(seed=...)")
+    mission = make_mission(mission, preset=preset, **fields)
     components = Components(channel=channel, controller=controller, scene=scene)
     # Copies: a component may draw or remember, and another environment may be given the same one.
     components = copy.deepcopy(components.made(mission))
@@ -92,20 +93,6 @@ def make_team_batch(mission: Mission | str, num_missions: int = 1, **options: An
             "aoi, or an environment whose agents are robots (swarm_mj.envs.pettingzoo)"
         )
     return batch
-
-
-def _mission_of(mission: Mission | str, preset: str | None, fields: dict[str, Any]) -> Mission:
-    """Return a mission as it is, or a task's, with other values of some fields."""
-    if "seed" in fields:
-        raise TypeError("seed is no option of an environment; give it to reset(seed=...)")
-    if isinstance(mission, Mission):
-        if preset not in (None, mission.preset):
-            raise ValueError(
-                f"preset {preset} goes with a task's name, and this mission is given whole, from "
-                f"the preset {mission.preset}; leave it out"
-            )
-        return replace(mission, **fields)
-    return make_mission(task=mission, preset=preset or Mission().preset, **fields)
 
 
 def _check_reward(reward: str, mission: Mission, controller: Controller | None) -> None:

@@ -176,7 +176,7 @@ FIGURES = (FLOCK, *RESULT_FIGURES)
 SWEEPS = {figure.task: figure for figure in _ALL if figure.sweeps_missions}
 
 
-def published(policy: str, mission: Mission) -> dict[Cost, Point]:
+def published(policy: str, mission: Mission) -> dict[str, Point]:
     """Return what the paper reports for a policy, by cost, if only x differs from its preset."""
     if policy not in BASELINES or mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}

@@ -14,10 +14,10 @@ import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.measured import HOW, Measured, column, later_column
-from swarm_mj.mission.specification import NOTHING, OPEN
+from swarm_mj.mission.specification import NOTHING, OPEN, Mission
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE
 from swarm_mj.radio.words import radio_in_words
-from swarm_mj.system.fields import FORMER_NAMES
+from swarm_mj.system.fields import former_names
 from swarm_mj.system.reading import read_json, read_rows
 from swarm_mj.system.writing import write_csv
 
@@ -463,7 +463,8 @@ def write_results(path: Path, results: Iterable[Result]) -> None:
 
 
 def _result(place: str, row: dict[str, str]) -> Result:
-    cells = {FORMER_NAMES.get(name, name): cell or None for name, cell in row.items()}
+    present = former_names(Mission)
+    cells = {present.get(name, name): cell or None for name, cell in row.items()}
     try:
         return msgspec.convert(cells, Result, strict=False)
     except msgspec.ValidationError as error:

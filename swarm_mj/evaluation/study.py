@@ -34,7 +34,7 @@ class Study:
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
     features: tuple[str, ...] = ()  # users' own extractors that learned policies may load
-    components: Components = Components()
+    components: Components = setting(Components(), former=("parts",))
     baseline: str | None = common_setting(
         None,
         "whom the others are compared to, mission by mission",

@@ -11,7 +11,7 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from swarm_mj.learning.selection import OTHER_FLIGHTS, Row, num_missions
-from swarm_mj.learning.settings import HELP, MAX_DECISIONS, Device, Training
+from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
 from swarm_mj.system import needs
@@ -37,15 +37,24 @@ class Limits:
 
     decisions: int | None = common_setting(
         None,
-        HELP["decisions"],
+        "stop after this many team decisions, earlier sessions included",
         label="budget",
         low=1,
         high=MAX_DECISIONS,
         shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
     )
-    minutes: float | None = common_setting(None, HELP["minutes"], low=1e-9, high=1e6)
+    minutes: float | None = common_setting(
+        None,
+        "stop after this many minutes, evaluations and earlier sessions included",
+        low=1e-9,
+        high=1e6,
+    )
     replay_every: int | None = setting(
-        None, HELP["replay_every"], label="replay-every", low=1, high=MAX_DECISIONS
+        None,
+        "record the first held-out mission in OUT/replays every N team decisions",
+        label="replay-every",
+        low=1,
+        high=MAX_DECISIONS,
     )
     patience: int | None = setting(
         None,

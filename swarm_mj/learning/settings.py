@@ -3,10 +3,7 @@
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import Literal, get_args
-
-import msgspec
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
@@ -24,8 +21,6 @@ HELD_OUT_SEED, CHOICE_SEED, TEST_SEED = 500_000, 510_000, 520_000
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
 MAX_DECISIONS = 10**12
-# What options mean, by the fields that they set.
-HELP = msgspec.toml.decode(Path(__file__).with_name("options.toml").read_bytes())
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -33,7 +28,11 @@ class PpoSettings:
     """PPO, in stable-baselines3's terms; the defaults are those of credit per robot."""
 
     learning_rate: float = setting(
-        1e-3, "of Adam, at the start", label="learning rate", low=1e-9, high=1.0
+        1e-3,
+        "of Adam, at the start",
+        label="learning rate",
+        low=1e-9,
+        high=1.0,
     )
     decay: float = setting(0.95, low=0.0, high=1.0)  # of the learning rate ...
     decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
@@ -41,7 +40,12 @@ class PpoSettings:
     num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
     num_minibatches: int = setting(10, low=1, high=10**6)  # into which a rollout is divided
     num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
-    discount: float = setting(0.0, HELP["discount"], low=0.0, high=1.0)
+    discount: float = setting(
+        0.0,
+        "gamma; 0: a packet's credit is that of its own window alone",
+        low=0.0,
+        high=1.0,
+    )
     gae_lambda: float = setting(0.9, low=0.0, high=1.0)
     clip: float = setting(0.2, low=1e-12, high=1e6)  # of the probability ratio
     clips_value: bool = False  # by the same number
@@ -49,15 +53,44 @@ class PpoSettings:
     value: float = setting(0.5, low=0.0, high=1.0)  # weight of the value's squared error
     max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)
     adam_epsilon: float = setting(1e-6, low=1e-12, high=1e6)
-    silent_share: float = setting(0.1, low=0.0, high=1.0, may_lack=True)  # of silent rows
+    silent_share: float = setting(0.1, low=0.0, high=1.0)  # of silent rows
 
     def __post_init__(self) -> None:
         check(self)
 
 
-# Those of credit per team, by the preset whose way it is.
-TEAM_PPO = msgspec.toml.decode(
-    Path(__file__).with_name("team_ppo.toml").read_bytes(), type=dict[str, PpoSettings]
+# PPO with credit per team: III-C and, for what it leaves open, the authors' code.
+PAPER_TEAM_PPO = PpoSettings(
+    learning_rate=1e-4,
+    decay=0.95,
+    # A decay every 500 optimiser steps would leave 3e-6 of the rate after the paper's 2 million
+    # observations: the code's 5000 are taken.
+    decay_steps=5000,
+    least_share=0.0,
+    num_steps=4,
+    num_minibatches=2,  # of 64
+    num_epochs=4,
+    discount=0.99,
+    gae_lambda=0.95,
+    clip=0.1,
+    clips_value=True,
+    entropy=1e-6,
+    value=0.5,
+)
+REFERENCE_TEAM_PPO = PpoSettings(
+    learning_rate=1e-4,
+    decay=0.95,
+    decay_steps=5000,
+    least_share=0.0,
+    num_steps=4,
+    num_minibatches=4,
+    num_epochs=4,
+    discount=0.99,
+    gae_lambda=0.95,
+    clip=0.1,
+    clips_value=True,
+    entropy=1e-6,
+    value=0.25,  # the code's value loss has an extra 1/2
 )
 ROBOTS_NETWORK = GnnShape(
     num_features=num_features("extended"), latent=32, depth=2, receptive_field=1, edges="both"
@@ -74,28 +107,57 @@ class Training:
 
     credit_assignment: CreditAssignment = common_setting(
         "robot",
-        HELP["credit_assignment"],
+        "credit assignment, per robot (each is paid for what its own packets changed; learns in "
+        "minutes) or per team (one reward for all, the paper's way)",
         label="credit",
         flag="--credit",
         choices=get_args(CreditAssignment),
+        former=("arm",),
     )
     mission: Mission
-    robots: tuple[int, ...] = common_setting(help=HELP["robots"], low=2, high=MAX_ROBOTS)
-    features: str = setting("extended", HELP["features"].format(", ".join(FEATURE_SETS)))
+    robots: tuple[int, ...] = common_setting(
+        help="size of the team; several are trained on together",
+        low=2,
+        high=MAX_ROBOTS,
+    )
+    features: str = setting(
+        "extended",
+        f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
+        "your own",
+    )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
-    silence_logit: float = setting(7.0, HELP["silence_logit"], low=-100.0, high=100.0)
-    reward: Reward = common_setting("aoi", HELP["reward"], choices=get_args(Reward))
+    silence_logit: float = setting(
+        7.0,
+        "added to the logit of silence, but in a robot's own turn",
+        low=-100.0,
+        high=100.0,
+    )
+    reward: Reward = common_setting(
+        "aoi",
+        "the cost to lower; velocity-variance needs --credit team",
+        choices=get_args(Reward),
+    )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
     seed: int = common_setting(0, "the same seed is the same policy", low=0, high=MAX_SEED)
     evaluate_every: int = setting(
-        10_000, HELP["evaluate_every"], label="evaluation interval", low=1, high=MAX_DECISIONS
+        10_000,
+        "team decisions between two evaluations",
+        label="evaluation interval",
+        low=1,
+        high=MAX_DECISIONS,
     )
-    held_out: int = setting(12, HELP["held_out"], label="held-out missions", low=1, high=10_000)
-    components: Components = Components()
+    held_out: int = setting(
+        12,
+        "missions of an evaluation, of each team size",
+        label="held-out missions",
+        low=1,
+        high=10_000,
+    )
+    components: Components = setting(Components(), former=("parts",))
     threads: int = setting(1, "torch's threads", low=1, high=256)
 
     def __post_init__(self) -> None:
@@ -146,6 +208,6 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
         network=GnnShape(num_features=inputs, num_outputs=num_outputs, edges="reference"),
         shares_trunk=False,
         silence_logit=0.0 if is_reference else EVEN_SILENCE,
-        ppo=TEAM_PPO["reference" if is_reference else "paper"],
+        ppo=REFERENCE_TEAM_PPO if is_reference else PAPER_TEAM_PPO,
         missions=32,
     )

@@ -1,58 +1,191 @@
 """Missions whose numbers go together: the paper's text, its authors' code, and whole worlds."""
 
-import tomllib
 from collections.abc import Callable
-from dataclasses import replace
-from functools import partial
-from pathlib import Path
+from dataclasses import fields, replace
 from typing import Any
 
 from swarm_mj.mission.specification import OPEN, Mission, Task
+from swarm_mj.system.fields import about_of
 
-_NUMBERS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 NEEDED = {  # the effect that a number counts with; a state of it, if only that
-    number: (effect, state or None) for number, (effect, state) in _NUMBERS["needed"].items()
+    spec.name: (switch.name, switch.state or None)
+    for spec in fields(Mission)
+    if (switch := about_of(spec).counts_with)
 }
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:
-    """Return the paper's text, taken literally, with any fields of `Mission` overridden.
+    """Return the paper's text, taken literally.
 
     Unless overridden, a flock has no boundary. In an arena with obstacles it has one, and physics
-    are `contact`, as where robots collide. Raises as `Mission` does.
+    are `contact`, as where robots collide.
+
+    Args:
+        task: What the robots do: "stationary", "random-walk" or "flocking".
+        **overrides: Fields of `Mission`, which says their units and ranges.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: A field is outside its range, or does not go with another.
+        TypeError: A field is unknown.
+
+    Example:
+        >>> paper("stationary", num_robots=20, fading="rayleigh").range_m  # [m]
+        250.0
     """
-    is_open = overrides.get("arena", OPEN) == OPEN
-    is_touching = not is_open or overrides.get("collide", False)
-    usual = Mission(
-        task=task,
-        # The paper's flocks fly off freely; obstacles only make sense where robots stay.
-        boundary="none" if task == "flocking" and is_open else "reflect",
-        physics="contact" if is_touching else "exact",
-    )
-    return replace(usual, **overrides)
+    return _overridden(Mission(task=task), overrides)
 
 
 def reference(task: Task = "flocking", **overrides: Any) -> Mission:
-    """Return the setting of the authors' published code and numbers; arguments as of `paper`."""
-    code = _NUMBERS["reference"] | {"tree_recomputed": task != "stationary"}
-    return paper(task, **(code | overrides))
+    """Return the setting of the authors' published code and numbers.
+
+    Args:
+        task: What the robots do, as of `paper`.
+        **overrides: Fields of `Mission`, as of `paper`.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: As of `paper`.
+        TypeError: As of `paper`.
+
+    Example:
+        >>> reference("random-walk").max_acceleration_mps2  # the text has 20 [m/s²]
+        10.0
+    """
+    code = Mission(
+        preset="reference",
+        task=task,
+        max_acceleration_mps2=10.0,
+        wall_hit="clip",
+        half_duplex="eavesdroppers",
+        flocking_set="moving",
+        silence_is_attempt=True,
+        moves_each_transmission=True,
+        tree_recomputed=task != "stationary",
+        tree_root_transmits=True,
+    )
+    return _overridden(code, overrides)
 
 
-def world(preset: str, task: Task = "random-walk", **overrides: Any) -> Mission:
-    """Return a mission in an arena of `WORLDS`, with its channel; arguments as of `paper`."""
-    return paper(task, **({"preset": preset} | WORLDS[preset] | overrides))
+# Arenas with their channels. Where obstacles stand they make what is not in line of sight, so the
+# channels are those of lines of sight: means of 3GPP TR 38.901 v16, Tables 7.4.1-1 (slopes,
+# shadowing) and 7.5-6 (correlation distances, K in dB: 9 of UMi, 7 of InH and RMa).
 
 
-WORLDS: dict[str, dict[str, Any]] = tomllib.loads(
-    Path(__file__).with_name("worlds.toml").read_text(encoding="utf-8")
-)
+def indoor(task: Task = "random-walk", **overrides: Any) -> Mission:
+    """Return a mission on an office floor; arguments and errors as of `paper`.
+
+    Free space between light walls is the multi-wall model (COST 231 1999, section 4.7).
+    """
+    floor = Mission(
+        preset="indoor",
+        task=task,
+        arena="rooms",
+        physics="contact",
+        shadowing_db=3.0,  # InH, office
+        shadowing_distance_m=10.0,
+        fading="rician",
+        rician_k=5.0,  # 7 dB
+    )
+    return _overridden(floor, overrides)
+
+
+def urban(task: Task = "random-walk", **overrides: Any) -> Mission:
+    """Return a mission in street canyons between blocks; arguments and errors as of `paper`.
+
+    UMi: 32.4 + 21 log10(d) + 20 log10(f) is free space up to 1 m. A block of 25 dB then is its
+    loss without line of sight: 23 dB more at 200 m.
+    """
+    streets = Mission(
+        preset="urban",
+        task=task,
+        arena="blocks",
+        physics="contact",
+        path_loss="log-distance",
+        loss_exponent=2.1,
+        reference_m=1.0,
+        shadowing_db=4.0,
+        shadowing_distance_m=10.0,
+        fading="rician",
+        rician_k=8.0,  # 9 dB
+    )
+    return _overridden(streets, overrides)
+
+
+def open_field(task: Task = "random-walk", **overrides: Any) -> Mission:
+    """Return a mission on an open field; arguments and errors as of `paper`.
+
+    Two-ray ground (Rappaport 2002), antennas as high as 3GPP's users carry theirs; K of RMa.
+    """
+    field = Mission(
+        preset="open-field",
+        task=task,
+        path_loss="two-ray",
+        antenna_height_m=1.5,
+        fading="rician",
+        rician_k=5.0,  # 7 dB
+    )
+    return _overridden(field, overrides)
+
+
+def _overridden(preset: Mission, overrides: dict[str, Any]) -> Mission:
+    """Return a preset's mission with other fields, and the walls and physics that go with them."""
+    is_open = overrides.get("arena", preset.arena) == OPEN
+    is_touching = not is_open or overrides.get("collide", preset.collide)
+    usual: dict[str, Any] = {
+        # The paper's flocks fly off freely; obstacles only make sense where robots stay.
+        "boundary": "none" if preset.task == "flocking" and is_open else "reflect",
+        "physics": "contact" if is_touching else "exact",
+    }
+    return replace(preset, **(usual | overrides))
+
+
 PAPERS: dict[str, Callable[..., Mission]] = {"paper": paper, "reference": reference}
-PRESETS = PAPERS | {name: partial(world, name) for name in WORLDS}
+WORLDS: dict[str, Callable[..., Mission]] = {
+    "indoor": indoor,
+    "urban": urban,
+    "open-field": open_field,
+}
+PRESETS = PAPERS | WORLDS
 
 
-def make_mission(**given: Any) -> Mission:
-    """Return a mission of the preset and task given, or the defaults, with the other fields."""
-    preset = given.pop("preset", Mission().preset)
+def make_mission(
+    mission: Mission | str | None = None, /, *, preset: str | None = None, **given: Any
+) -> Mission:
+    """Return the mission that arguments name, be they of Python, a file or a command line.
+
+    Args:
+        mission: A mission, to change fields of; or what the robots do, as the field `task`, too,
+            may say. None is the preset's own task.
+        preset: A name of `PRESETS`; None is "paper", or the preset of the mission given.
+        **given: Other fields of `Mission`, which says their units and ranges.
+
+    Returns:
+        The mission of the preset, or the one given, with those fields.
+
+    Raises:
+        ValueError: A field is outside its range, or does not go with another; or a mission is
+            given with another preset than its own.
+        TypeError: A field is unknown, or the task is given twice.
+
+    Example:
+        >>> make_mission("flocking", preset="urban", num_robots=9).arena
+        'blocks'
+    """
+    if isinstance(mission, Mission):
+        if preset not in (None, mission.preset):
+            raise ValueError(
+                f"preset {preset} goes with a task's name, and this mission is given whole, from "
+                f"the preset {mission.preset}; leave it out"
+            )
+        return replace(mission, **given)
+    usual = Mission()
+    preset = usual.preset if preset is None else preset
+    task = {} if mission is None else {"task": mission}
     # Refuses an unknown preset or task by the field's own message, before it is looked up.
-    replace(Mission(), preset=preset, task=given.get("task", Mission().task))
-    return PRESETS[preset](**given)
+    replace(usual, preset=preset, task=task.get("task", given.get("task", usual.task)))
+    return PRESETS[preset](**task, **given)

@@ -6,13 +6,16 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from dataclasses import dataclass
-from functools import partial
-from pathlib import Path
 from typing import Any, Literal, get_args
 
-import msgspec
-
-from swarm_mj.system.fields import FieldOf, check, check_names, setting
+from swarm_mj.system.fields import (
+    above_zero,
+    check,
+    check_names,
+    former_names,
+    set_to,
+    setting,
+)
 
 Preset = Literal["paper", "reference", "indoor", "urban", "open-field"]
 Task = Literal["stationary", "random-walk", "flocking"]
@@ -35,30 +38,6 @@ OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
 NEW = "not the paper's"  # the source of what the paper has not
-HELP = msgspec.toml.decode(Path(__file__).with_name("options.toml").read_bytes())  # by labels
-
-
-def _named(label: str, default: object, **about: Any) -> FieldOf:
-    """Return a field with a name in words; with a help text, it is an option."""
-    return setting(default, HELP.get(label, ""), label=label, **about)
-
-
-def _number(
-    default: float | int | None, label: str, unit: str, low: float, high: float, **more: str | bool
-) -> FieldOf:
-    """Return a number: name in words, unit, range. By default it is of IV-B."""
-    about: dict[str, Any] = {"source": "IV-B", "unit": unit, "low": low, "high": high}
-    return _named(label, default, **about | more)
-
-
-# Numbers of the channel beyond free space are options under a heading of their own.
-_radio = partial(_number, group=CHANNEL, source=NEW)
-_new = partial(_number, source=NEW, may_lack=True)
-
-
-def _choice(default: str, label: str, source: str, choices: object, **about: Any) -> FieldOf:
-    """Return one of several names, given as a `Literal`."""
-    return _named(label, default, source=source, choices=get_args(choices), **about)
 
 
 def in_order(prior_knowledge: str) -> str:
@@ -72,69 +51,447 @@ def in_order(prior_knowledge: str) -> str:
 class Mission:
     """A mission's numbers; the defaults are the paper's text (IV-B).
 
-    A field with a help text (`options.toml`) is an option, too: `num_robots` is `--robots`.
+    Each field says its meaning, unit, range and source. One that has a help text is an option of
+    the command line, too: `num_robots` is `--robots`. `paper` and the other presets make missions
+    whose fields go together; `Mission(...)` itself takes every field as it is given.
 
-    Raises ValueError for a field outside its range, and names the value and the range; TypeError
-    for an unknown field, and names the one most like it.
+    Raises:
+        ValueError: A field is outside its range, or does not go with another; the message names
+            the value and the range.
+        TypeError: A field is unknown; the message names the one most like it.
+
+    Example:
+        >>> mission = Mission(task="stationary", num_robots=90, density_per_km2=10.0)
+        >>> mission.side_m  # of the square area [m]
+        3000.0
     """
 
-    preset: str = _choice("paper", "preset", "IV-B", Preset)
-    task: Task = _choice("flocking", "task", "IV", Task)
-    num_robots: int = _number(40, "number of robots", "robots", 2.0, 10_000.0)
-    density_per_km2: float = _number(40.0, "density", "robots/km²", 0.1, 10_000.0)
-    range_ratio: float = _number(0.25, "range ratio", "of 1 km", 0.01, 10.0)
-    velocity_ratio: float = _number(0.15, "velocity ratio", "of 1 km in 50 s", 0.001, 5.0)
-    max_acceleration_mps2: float = _number(20.0, "A_max", "m/s²", 0.01, 1000.0)
-    window_s: float = _number(0.1, "window", "s", 0.01, 10.0)
-    num_windows: int = _number(500, "number of windows", "windows", 1.0, 100_000.0)
-    # The paper writes "1 dBm", but a threshold on a ratio is a ratio: 1 dB.
-    sinr_threshold_db: float = _number(1.0, "SINR threshold", "dB", -30.0, 60.0, group=CHANNEL)
-    noise_dbm: float = _number(-50.0, "noise power", "dBm", -200.0, 50.0, group=CHANNEL)
-    sensing_dbm: float | None = _radio(  # files of development versions lack it
-        None, "sensing threshold", "dBm", -200.0, 50.0, may_lack=True
+    # What is flown.
+    preset: str = setting(
+        "paper",
+        "the paper's text or code, or an arena with its channel",
+        label="preset",
+        source="IV-B",
+        choices=get_args(Preset),
     )
-    frequency_hz: float = _number(2.4e9, "centre frequency", "Hz", 1e6, 1e12)
-    position_noise_m: float = _new(0.0, "position noise", "m", 0.0, 1e4)
-    position_noise_s: float = _new(10.0, "position noise time", "s", 0.0, 1e5)
-    failure_fraction: float = _number(0.0, "failure fraction", "of the team", 0.0, 0.9, source=NEW)
-    arena: str = _named("arena", OPEN, metavar="NAME")
-
-    # The channel beyond the paper's free space (`radio.mission_radio`).
-    path_loss: PathLossLaw = _choice("free-space", "path loss", "Eq. 1", PathLossLaw, group=CHANNEL)
-    loss_exponent: float = _radio(3.0, "path loss exponent", "1", 1.0, 10.0)
-    reference_m: float = _radio(20.0, "reference distance", "m", 0.1, 10_000.0)
-    antenna_height_m: float = _radio(1.0, "antenna height", "m", 0.1, 100.0)
-    shadowing_db: float = _radio(0.0, "shadowing", "dB", 0.0, 30.0)
-    shadowing_distance_m: float = _radio(20.0, "shadowing distance", "m", 0.1, 10_000.0)
-    fading: FadingLaw = _choice("none", "fading", NEW, FadingLaw, group=CHANNEL)
-    rician_k: float = _radio(4.0, "Rician K", "1", 0.0, 10_000.0)
-    erasure: float = _radio(0.0, "erasure probability", "1", 0.0, 0.99)
-    burst_begin: float = _radio(0.0, "burst begin", "per slot", 0.0, 0.5)
-    burst_end: float = _radio(0.05, "burst end", "per slot", 0.001, 0.5)
-    high_power_fraction: float = _radio(0.0, "high-power fraction", "of the team", 0.0, 1.0)
-    high_power_db: float = _radio(6.0, "extra power", "dB", 0.0, 60.0)
-    clock_offset_s: float = _radio(0.0, "clock offset", "s", 0.0, 10.0, may_lack=True)
-    clock_drift_ppm: float = _radio(0.0, "clock drift", "ppm", 0.0, 10_000.0, may_lack=True)
-    prior_knowledge: str = _choice(
-        NOTHING, "prior knowledge", NEW, Knowable, group=CHANNEL, is_joined=True, convert=in_order
+    task: Task = setting(
+        "flocking",
+        "what the robots do",
+        label="task",
+        source="IV",
+        choices=get_args(Task),
     )
-    map_offset_m: float = _radio(0.0, "map offset", "m", 0.0, 1e4, may_lack=True)
-    bit_rate: float | None = _radio(None, "bit rate", "bit/s", 1.0, 1e12, metavar="RATE")
 
-    physics: PhysicsMode = _choice("exact", "physics", "Eq. 15", PhysicsMode)
-    collide: bool = _named("robots collide", False)
-    boundary: Boundary = _choice("reflect", "boundary", "IV-A", Boundary)
-    wall_hit: WallHit = _choice("mirror", "wall hit", "IV-A; the code clips", WallHit)
-    half_duplex: HalfDuplex = _choice("strict", "half duplex", "Eq. 3", HalfDuplex)
-    flocking_set: FlockingSet = _choice("heard", "flocking set F", "Eq. 16", FlockingSet)
-    silence_is_attempt: bool = False  # Eq. 7; the code also sets L of a silent robot to itself
-    moves_each_transmission: bool = False  # IV-B; the code moves twice per window of flooding
-    tree_recomputed: bool = False  # IV-C; the code rebuilds the tree of a mobile team each window
-    tree_root_transmits: bool = False  # IV-C; the code's root addresses the last robot
+    # The team and its area.
+    num_robots: int = setting(
+        40,
+        "size of the team",
+        label="number of robots",
+        unit="robots",
+        low=2,
+        high=10_000,
+        source="IV-B",
+    )
+    density_per_km2: float = setting(
+        40.0,
+        label="density",
+        unit="robots/km²",
+        low=0.1,
+        high=10_000.0,
+        source="IV-B",
+    )
+    range_ratio: float = setting(
+        0.25,
+        "range of a packet in silence",
+        label="range ratio",
+        unit="of 1 km",
+        low=0.01,
+        high=10.0,
+        source="IV-B",
+    )
+
+    # How robots move (IV-A).
+    velocity_ratio: float = setting(
+        0.15,
+        "per axis; 0.15 is 3 m/s",
+        label="velocity ratio",
+        unit="of 1 km in 50 s",
+        low=0.001,
+        high=5.0,
+        source="IV-B",
+    )
+    max_acceleration_mps2: float = setting(
+        20.0,
+        label="A_max",
+        unit="m/s²",
+        low=0.01,
+        high=1000.0,
+        source="IV-B",
+    )
+
+    # Time.
+    window_s: float = setting(
+        0.1,
+        label="window",
+        unit="s",
+        low=0.01,
+        high=10.0,
+        source="IV-B",
+    )
+    num_windows: int = setting(
+        500,
+        "length, in windows of 100 ms",
+        label="number of windows",
+        unit="windows",
+        low=1,
+        high=100_000,
+        source="IV-B",
+    )
+
+    # The radio.
+    sinr_threshold_db: float = setting(
+        1.0,  # the paper writes "1 dBm", but a threshold on a ratio is a ratio
+        "least SINR that decodes",
+        label="SINR threshold",
+        unit="dB",
+        low=-30.0,
+        high=60.0,
+        source="IV-B",
+        group=CHANNEL,
+    )
+    noise_dbm: float = setting(
+        -50.0,
+        "transmit power follows it",
+        label="noise power",
+        unit="dBm",
+        low=-200.0,
+        high=50.0,
+        source="IV-B",
+        group=CHANNEL,
+    )
+    sensing_dbm: float | None = setting(
+        None,
+        "power that csma and age-gain-csma sense",
+        label="sensing threshold",
+        unit="dBm",
+        low=-200.0,
+        high=50.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+    frequency_hz: float = setting(
+        2.4e9,
+        label="centre frequency",
+        unit="Hz",
+        low=1e6,
+        high=1e12,
+        source="IV-B",
+    )
+
+    # What robots get wrong, and how many fail.
+    position_noise_m: float = setting(
+        0.0,
+        "standard deviation of robots' own positions, per axis",
+        label="position noise",
+        unit="m",
+        low=0.0,
+        high=1e4,
+        source=NEW,
+    )
+    position_noise_s: float = setting(
+        10.0,
+        "its correlation time; it stays as it is while a robot stands",
+        label="position noise time",
+        unit="s",
+        low=0.0,
+        high=1e5,
+        source=NEW,
+        counts_with=above_zero(position_noise_m),
+    )
+    failure_fraction: float = setting(
+        0.0,
+        "robots that fail half-way",
+        label="failure fraction",
+        unit="of the team",
+        low=0.0,
+        high=0.9,
+        source=NEW,
+        former=("switched_off",),
+    )
+
+    # What stands in the area. The arenas are those of `physics.arenas`, which this room is before.
+    arena: str = setting(
+        OPEN,
+        "what stands in the area",
+        label="arena",
+        source=NEW,
+        metavar="NAME",
+    )
+
+    # Path loss.
+    path_loss: PathLossLaw = setting(
+        "free-space",
+        "how power falls with distance",
+        label="path loss",
+        source="Eq. 1",
+        choices=get_args(PathLossLaw),
+        group=CHANNEL,
+    )
+    loss_exponent: float = setting(
+        3.0,
+        "slope of log-distance: 2 is free space's",
+        label="path loss exponent",
+        unit="1",
+        low=1.0,
+        high=10.0,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=set_to(path_loss, "log-distance"),
+    )
+    reference_m: float = setting(
+        20.0,
+        "where log-distance begins",
+        label="reference distance",
+        unit="m",
+        low=0.1,
+        high=10_000.0,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=set_to(path_loss, "log-distance"),
+    )
+    antenna_height_m: float = setting(
+        1.0,
+        "above the floor, for two-ray",
+        label="antenna height",
+        unit="m",
+        low=0.1,
+        high=100.0,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=set_to(path_loss, "two-ray"),
+    )
+
+    # Shadowing and fading.
+    shadowing_db: float = setting(
+        0.0,
+        "standard deviation of log-normal shadowing",
+        label="shadowing",
+        unit="dB",
+        low=0.0,
+        high=30.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+    shadowing_distance_m: float = setting(
+        20.0,
+        "over which its correlation falls to 1/e",
+        label="shadowing distance",
+        unit="m",
+        low=0.1,
+        high=10_000.0,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=above_zero(shadowing_db),
+    )
+    fading: FadingLaw = setting(
+        "none",
+        "of every link, anew in each slot",
+        label="fading",
+        source=NEW,
+        choices=get_args(FadingLaw),
+        group=CHANNEL,
+    )
+    rician_k: float = setting(
+        4.0,
+        "power in line of sight over scattered; 0: Rayleigh",
+        label="Rician K",
+        unit="1",
+        low=0.0,
+        high=10_000.0,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=set_to(fading, "rician"),
+    )
+
+    # Packets lost at random, one by one or in bursts.
+    erasure: float = setting(
+        0.0,
+        "share of packets lost at each receiver",
+        label="erasure probability",
+        unit="1",
+        low=0.0,
+        high=0.99,
+        source=NEW,
+        group=CHANNEL,
+    )
+    burst_begin: float = setting(
+        0.0,
+        "probability that a receiver goes deaf",
+        label="burst begin",
+        unit="per slot",
+        low=0.0,
+        high=0.5,
+        source=NEW,
+        group=CHANNEL,
+    )
+    burst_end: float = setting(
+        0.05,
+        "probability that it hears again",
+        label="burst end",
+        unit="per slot",
+        low=0.001,
+        high=0.5,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=above_zero(burst_begin),
+    )
+
+    # Robots with more transmit power.
+    high_power_fraction: float = setting(
+        0.0,
+        "robots with more transmit power",
+        label="high-power fraction",
+        unit="of the team",
+        low=0.0,
+        high=1.0,
+        source=NEW,
+        former=("strong_share",),
+        group=CHANNEL,
+    )
+    high_power_db: float = setting(
+        6.0,
+        "how much more that is",
+        label="extra power",
+        unit="dB",
+        low=0.0,
+        high=60.0,
+        source=NEW,
+        former=("strong_db",),
+        group=CHANNEL,
+        counts_with=above_zero(high_power_fraction),
+    )
+
+    # Clocks.
+    clock_offset_s: float = setting(
+        0.0,
+        "largest difference between clocks",
+        label="clock offset",
+        unit="s",
+        low=0.0,
+        high=10.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+    clock_drift_ppm: float = setting(
+        0.0,
+        "largest drift of a clock",
+        label="clock drift",
+        unit="ppm",
+        low=0.0,
+        high=10_000.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+
+    # What robots know beforehand.
+    prior_knowledge: str = setting(
+        NOTHING,
+        "what robots know before the mission, several joined by commas",
+        label="prior knowledge",
+        source=NEW,
+        choices=get_args(Knowable),
+        is_joined=True,
+        convert=in_order,
+        former=("known",),
+        group=CHANNEL,
+    )
+    map_offset_m: float = setting(
+        0.0,
+        "how far east robots' map is of the truth",
+        label="map offset",
+        unit="m",
+        low=0.0,
+        high=1e4,
+        source=NEW,
+        group=CHANNEL,
+        counts_with=set_to(prior_knowledge, "map"),
+    )
+
+    # What fits into a slot.
+    bit_rate: float | None = setting(
+        None,
+        "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
+        label="bit rate",
+        unit="bit/s",
+        low=1.0,
+        high=1e12,
+        source=NEW,
+        metavar="RATE",
+        group=CHANNEL,
+    )
+
+    # Physics and walls.
+    physics: PhysicsMode = setting(
+        "exact",
+        "Eq. 15, or forces, as obstacles need",
+        label="physics",
+        source="Eq. 15",
+        choices=get_args(PhysicsMode),
+    )
+    collide: bool = setting(
+        False,
+        "robots bounce off each other, too, in contact physics",
+        label="robots collide",
+        source=NEW,
+    )
+    boundary: Boundary = setting(
+        "reflect",
+        "at the area's edge; reflect among obstacles",
+        label="boundary",
+        source="IV-A",
+        choices=get_args(Boundary),
+    )
+
+    # Where the paper's text and its authors' code differ. These have no help: they are no options,
+    # but a preset sets them all.
+    wall_hit: WallHit = setting(
+        "mirror",
+        label="wall hit",
+        source="IV-A; the code clips",
+        choices=get_args(WallHit),
+    )
+    half_duplex: HalfDuplex = setting(
+        "strict",
+        label="half duplex",
+        source="Eq. 3",
+        choices=get_args(HalfDuplex),
+    )
+    flocking_set: FlockingSet = setting(
+        "heard",
+        label="flocking set F",
+        source="Eq. 16",
+        choices=get_args(FlockingSet),
+    )
+    silence_is_attempt: bool = setting(
+        False,
+        source="Eq. 7; the code also sets L of a silent robot to itself",
+    )
+    moves_each_transmission: bool = setting(
+        False,
+        source="IV-B; the code moves twice per window of flooding",
+    )
+    tree_recomputed: bool = setting(
+        False,
+        source="IV-C; the code rebuilds the tree of a mobile team each window",
+    )
+    tree_root_transmits: bool = setting(
+        False,
+        source="IV-C; the code's root addresses the last robot",
+    )
 
     def __new__(cls, **given: Any) -> "Mission":
         """Refuse unknown fields by a message that names the likely one."""
-        check_names("Mission", given, cls.__dataclass_fields__)
+        check_names("Mission", given, cls.__dataclass_fields__, former_names(cls))
         return super().__new__(cls)
 
     def __post_init__(self) -> None:

@@ -5,15 +5,17 @@ line at once.
 """
 
 import inspect
-from collections.abc import Collection, Iterable
-from dataclasses import MISSING, Field, field, fields
+from collections.abc import Callable, Collection, Iterable, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields
 from difflib import get_close_matches
-from functools import partial
+from functools import cache, partial
 from numbers import Integral, Real
-from types import NoneType
-from typing import Any, Literal, get_args, get_origin
+from types import MappingProxyType, NoneType
+from typing import Any, Literal, TypeVar, cast, get_args, get_origin
 
 import numpy as np
+
+Value = TypeVar("Value")
 
 # What an annotation admits, NumPy's numbers included, and how a message calls it.
 KINDS: dict[Any, tuple[type, str]] = {
@@ -23,41 +25,176 @@ KINDS: dict[Any, tuple[type, str]] = {
 }
 # Until when former names and options that are ignored still work, for help and documentation.
 GONE_IN = "version 2.0, not before 2027-12-01"
-# Fields by the names that they once had. Stored files are read with either name; command lines take
-# both; Python gets the new one. docs/options.md lists them.
-FORMER_NAMES = {
-    "known": "prior_knowledge",
-    "switched_off": "failure_fraction",
-    "strong_share": "high_power_fraction",
-    "strong_db": "high_power_db",
-    "parts": "components",
-    "arm": "credit_assignment",
-}
-FieldOf = Any  # what a field's maker returns: type checkers take it for the attribute's value
+NO_NAMES: Mapping[str, str] = MappingProxyType({})
+REQUIRED: Any = MISSING  # the default of a field whose value must be given
+ABOUT = "about"  # the one key of a field's metadata
 
 
-def setting(default: object = MISSING, help: str = "", **metadata: Any) -> FieldOf:
-    """Return a field that says what it means; without a default, its value must be given.
+@dataclass(frozen=True)
+class Switch:
+    """What another field must be for a field to count: a number above 0, or in one state."""
 
-    `help` says what it means on the command line; without it, the field is no option. The metadata
-    are `label`, the name in words; `unit`; `source`, where the default comes from; `low` and
-    `high`, the range; `choices`, and `is_joined` where several may be joined by commas; and what
-    `cli.options` shows: `group`, the heading it stands under; `metavar`; `shown`, the default in
-    words; `is_positional`, for an option without a flag; `is_common`, for those that
-    `--help` shows and does not leave to `--help-all`; `flag`, if it is not made from the name;
-    `convert`, which makes a value of what was typed.
+    field: Field[Any]
+    state: str = ""  # one of its choices; "" is any number above 0
+
+    @property
+    def name(self) -> str:
+        """The name of the other field."""
+        return self.field.name
+
+    def is_on(self, settings: object) -> bool:
+        """Return whether it is so in some settings; of joined choices, one is enough."""
+        value = getattr(settings, self.name)
+        return self.state in value.split(",") if self.state else value > 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class About:
+    """What a field says of itself; `setting` explains each of these."""
+
+    help: str = ""
+    label: str = ""
+    unit: str = ""
+    source: str = ""
+    low: float | int | None = None
+    high: float | int | None = None
+    choices: tuple[str, ...] = ()
+    is_joined: bool = False
+    counts_with: Switch | None = None
+    former: tuple[str, ...] = ()
+    group: str = ""
+    metavar: str = ""
+    shown: str | None = None
+    flag: str = ""
+    convert: Callable[[str], object] | None = None
+    is_positional: bool = False
+    is_common: bool = False
+
+    def __post_init__(self) -> None:
+        if (self.low is None) != (self.high is None):
+            raise TypeError(f"a range needs both ends, not low={self.low} and high={self.high}")
+
+    @property
+    def has_range(self) -> bool:
+        """True if numbers have to lie between two ends."""
+        return self.low is not None
+
+
+def setting(
+    default: Value = REQUIRED,
+    help: str = "",
+    *,
+    label: str = "",
+    unit: str = "",
+    source: str = "",
+    low: float | int | None = None,
+    high: float | int | None = None,
+    choices: Collection[str] = (),
+    is_joined: bool = False,
+    counts_with: Switch | None = None,
+    former: tuple[str, ...] = (),
+    group: str = "",
+    metavar: str = "",
+    shown: str | None = None,
+    flag: str = "",
+    convert: Callable[[str], object] | None = None,
+    is_positional: bool = False,
+    is_common: bool = False,
+) -> Value:
+    """Return a dataclass's field that says what it means; type checkers take it for its default.
+
+    Args:
+        default: Its value unless given; without a default, it must be given.
+        help: What it means on the command line; without it, the field is no option.
+        label: Its name in words, for messages; its name in Python unless given.
+        unit: Of its number, as it is printed in brackets.
+        source: Where the default comes from, such as an equation of the paper.
+        low: The least number that is allowed.
+        high: The largest number that is allowed; both ends are given, or none.
+        choices: The texts that are allowed, if not all are.
+        is_joined: Whether several choices may be joined by commas.
+        counts_with: Another field that must be on for this one to count: see `above_zero`.
+        former: Its names in earlier releases: stored files and command lines may have those.
+        group: The heading that it stands under in the help.
+        metavar: What stands for its value in the help.
+        shown: What the help says in place of the default; "" is nothing.
+        flag: Its option, if that is not made from its name.
+        convert: Makes the value of what was typed.
+        is_positional: Whether the option has no flag.
+        is_common: Whether `--help` shows it, and does not leave it to `--help-all`.
+
+    Raises:
+        TypeError: A range has one end only.
     """
-    return field(default=default, metadata=metadata | ({"help": help} if help else {}))
+    about = About(
+        help=help,
+        label=label,
+        unit=unit,
+        source=source,
+        low=low,
+        high=high,
+        choices=tuple(choices),
+        is_joined=is_joined,
+        counts_with=counts_with,
+        former=former,
+        group=group,
+        metavar=metavar,
+        shown=shown,
+        flag=flag,
+        convert=convert,
+        is_positional=is_positional,
+        is_common=is_common,
+    )
+    return field(default=default, metadata={ABOUT: about})
 
 
 # An option that `--help` shows and does not leave to `--help-all`.
 common_setting = partial(setting, is_common=True)
 
 
-def same_as(owner: type[Any], name: str) -> FieldOf:
+def above_zero(switch: object) -> Switch:
+    """Return that a field counts where another one of its class is above 0.
+
+    In the body of a class, the name of another field is that field itself, so that no misspelt
+    name gets past a type checker, nor past the import. Raises TypeError for what is no `setting`.
+    """
+    if not isinstance(switch, Field) or not about_of(switch).has_range:
+        raise TypeError(f"counts_with needs a number that is a `setting`, not {switch!r:.80}")
+    return Switch(switch)
+
+
+def set_to(switch: object, state: str) -> Switch:
+    """Return that a field counts where another one, as of `above_zero`, is set to a choice."""
+    choices = about_of(switch).choices if isinstance(switch, Field) else ()
+    if not isinstance(switch, Field) or state not in choices:
+        raise TypeError(f"counts_with needs one of {', '.join(choices)}, not {state!r}")
+    return Switch(switch, state)
+
+
+def about_of(spec: Field[Any]) -> About:
+    """Return what a dataclass's field says of itself; nothing, if it is no `setting`."""
+    return spec.metadata.get(ABOUT, About())
+
+
+def same_as(owner: type[Any], name: str) -> Any:  # noqa: ANN401 - as the other field's value
     """Return a field like another dataclass's: its default, meaning and range."""
     spec = owner.__dataclass_fields__[name]
     return field(default=spec.default, metadata=spec.metadata)
+
+
+@cache
+def former_names(*kinds: type[Any]) -> Mapping[str, str]:
+    """Return the present names of dataclasses' fields by those that they had in earlier releases.
+
+    Stored files are read with either name; command lines take both; Python takes the new one, and
+    a message leads there. docs/options.md lists them.
+    """
+    present: dict[str, str] = {}
+    for kind in kinds:
+        for spec in fields(kind):
+            for former in about_of(spec).former:
+                present[former] = spec.name
+    return MappingProxyType(present)
 
 
 def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
@@ -90,8 +227,9 @@ def kind_of(spec: Field[Any]) -> object:
 
 def range_of(spec: Field[Any]) -> str:
     """Return a field's allowed numbers and their unit, in words."""
-    ends = " to ".join(as_typed(spec.metadata[end]) for end in ("low", "high"))
-    return f"{ends} [{spec.metadata['unit']}]" if "unit" in spec.metadata else ends
+    about = about_of(spec)
+    ends = f"{as_typed(about.low)} to {as_typed(about.high)}"
+    return f"{ends} [{about.unit}]" if about.unit else ends
 
 
 def as_typed(value: object) -> str:
@@ -103,22 +241,33 @@ def as_typed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-def did_you_mean(typed: object, known: Iterable[str]) -> str:
-    """End a complaint about an unknown name: the known one most like it, or nothing."""
+def did_you_mean(typed: object, known: Iterable[str], former: Mapping[str, str] = NO_NAMES) -> str:
+    """End a complaint about an unknown name: the known one most like it, or nothing.
+
+    Args:
+        typed: The unknown name.
+        known: Those that are known.
+        former: Those that were known, and what they are called now.
+    """
     names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
     bare = str(typed).lstrip("-")
-    likely = [new for new in names if new == FORMER_NAMES.get(bare)]
+    likely = [name for name in names if name == former.get(bare)]
     likely += [name for name in names if bare in name.split("_")[1:]]  # windows of num_windows
     likely += get_close_matches(bare, names, n=1)
     return f"; did you mean {names[likely[0]]}?" if likely else ""
 
 
-def check_names(what: str, given: Iterable[str], known: Iterable[str]) -> None:
+def check_names(
+    what: str,
+    given: Iterable[str],
+    known: Iterable[str],
+    former: Mapping[str, str] = NO_NAMES,
+) -> None:
     """Raise TypeError, in Python's words, which TorchRL reads, for a keyword that is not known."""
     known = list(known)
     for name in given:
         if name not in known:
-            hint = did_you_mean(name, known) or f"; it has {', '.join(known)}"
+            hint = did_you_mean(name, known, former) or f"; it has {', '.join(known)}"
             raise TypeError(f"{what} got an unexpected keyword argument {name!r}{hint}")
 
 
@@ -170,16 +319,17 @@ def _shown(value: object) -> str:
 
 def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     """Check one value of a field, which may be `called` otherwise where it was given."""
-    allowed = spec.metadata
-    label = called or allowed.get("label", spec.name)
+    about = about_of(spec)
+    label = called or about.label or spec.name
     kind, described = KINDS.get(kind_of(spec), (object, ""))
-    if "choices" in allowed:
-        check_choice(label, value, allowed["choices"], is_joined=allowed.get("is_joined", False))
-    is_number = not isinstance(value, bool)  # Python's True is 1
-    is_allowed = isinstance(value, kind) and (is_number or kind in (bool, object))
+    if about.choices:
+        check_choice(label, value, about.choices, is_joined=about.is_joined)
+    is_bool = isinstance(value, bool)  # Python's True is 1
+    is_allowed = isinstance(value, kind) and (not is_bool or kind in (bool, object))
     limits = ""
-    if "low" in allowed:
-        is_allowed &= isinstance(value, Real) and allowed["low"] <= value <= allowed["high"]
+    if about.low is not None and about.high is not None:
+        is_number = isinstance(value, Real)
+        is_allowed &= is_number and about.low <= cast("float", value) <= about.high
         limits = f" from {range_of(spec)}"
     if not is_allowed:
         shown = repr(value) if isinstance(value, str) else value

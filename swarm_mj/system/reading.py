@@ -1,8 +1,8 @@
 """Strict reading of files that others wrote: every value is checked.
 
 Files are regular, and no larger than expected. The rows of a table have as many cells as it has
-columns. JSON has the keys of a dataclass, all of them and no others, and its numbers are finite.
-Ranges are the dataclass's own.
+columns. JSON has the keys of a dataclass and no others, and its numbers are finite; only a field
+with a default may lack. Ranges are the dataclass's own.
 """
 
 import csv
@@ -15,7 +15,7 @@ from typing import Annotated, Any, BinaryIO, TypeVar
 
 import msgspec
 
-from swarm_mj.system.fields import FORMER_NAMES
+from swarm_mj.system.fields import former_names
 
 Kind = TypeVar("Kind")
 Row = tuple[int, dict[str, str]]
@@ -88,7 +88,7 @@ def read_document(text: bytes | str, name: str, version: int, kind: type[Kind]) 
 def read_plain(value: object, kind: type[Kind]) -> Kind:
     """Return numbers, texts, lists and dicts as `read_json` does, or raise ValueError."""
     try:
-        return msgspec.convert(_with_all_keys(value, kind), kind, dec_hook=_made)
+        return msgspec.convert(_with_present_names(value, kind), kind, dec_hook=_made)
     except msgspec.ValidationError as error:
         raise ValueError(_in_a_line(error)) from error
 
@@ -118,19 +118,16 @@ def _made(kind: type[Any], value: object) -> object:
     return kind(value)
 
 
-def _with_all_keys(value: object, kind: object, at: str = "$") -> object:
-    """Return a dataclass's plain values by its fields' present names, nested ones included."""
-    # msgspec itself would fill in what lacks and drop what is unknown: a damaged or newer file
-    # would pass. Fields that say `may_lack` are newer than some files: there they have defaults.
+def _with_present_names(value: object, kind: object, at: str = "$") -> object:
+    """Return a dataclass's plain values by its fields' present names; ValueError for others."""
+    # msgspec itself would drop what is unknown: a newer file would pass. It fills in what lacks and
+    # has a default, as such a field is newer than the file, and refuses what has none.
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
     known: dict[Any, Any] = {spec.name: spec for spec in fields(kind)}
     lacking = known.keys() - value.keys()
-    new = {old: name for old, name in FORMER_NAMES.items() if name in lacking}
+    new = {old: name for old, name in former_names(kind).items() if name in lacking}
     named = {new.get(key, key): each for key, each in value.items()}
     for key in named.keys() - known.keys():
         raise ValueError(f"Object contains unknown field `{key!s:.40}` - at `{at}`")
-    for name in known.keys() - named.keys():
-        if not known[name].metadata.get("may_lack"):
-            raise ValueError(f"Object missing required field `{name}` - at `{at}`")
-    return {key: _with_all_keys(x, known[key].type, f"{at}.{key}") for key, x in named.items()}
+    return {key: _with_present_names(x, known[key].type, f"{at}.{key}") for key, x in named.items()}

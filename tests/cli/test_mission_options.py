@@ -1,15 +1,24 @@
 """The options' missions and policies are the library's, and so are their defaults."""
 
+import re
 import shlex
+from pathlib import Path
 
 import pytest
 
 import swarm_mj
 from swarm_mj.api.fly import mission_of
 from swarm_mj.cli import main, parse
-from swarm_mj.cli.mission_options import NAMES, mission_flags
-from swarm_mj.mission import PRESETS, WORLDS, paper, reference
+from swarm_mj.cli.mission_options import NAMES, SPECS, mission_flags
+from swarm_mj.cli.options import flags_of
+from swarm_mj.evaluation.study import Study
+from swarm_mj.learning.settings import Training
+from swarm_mj.mission import PRESETS, WORLDS, Mission, paper, reference
+from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import POLICIES
+from swarm_mj.system.fields import GONE_IN, about_of, former_names
+
+ROOT = Path(__file__).parents[2]
 
 
 def mission(*arguments):
@@ -103,6 +112,25 @@ def test_every_field_is_swept(typed, field, values):
 )
 def test_former_options_still_count(former, present):
     assert missions(*former.split()) == missions(*present.split()) != missions()
+
+
+def test_former_names_are_listed_with_the_date_until_when_they_work():
+    former = former_names(Mission, Study, Training)
+    options = (ROOT / "docs/options.md").read_text().split("## Former names")[1].split("\n## ")[0]
+    rows = re.findall(r"\| `(\w+)` \| `(\w+)` \|$", options, re.MULTILINE)
+    assert dict(rows) == former
+    for page in (options, (ROOT / "CHANGELOG.md").read_text()):
+        assert GONE_IN in " ".join(page.split())
+        assert all(f"`{name}`" in page or f"`--{name}" in page for name in former)
+
+
+def test_the_help_shows_every_field_that_has_help(capsys):
+    assert main(["fly", "--help-all"]) == 0
+    shown = " ".join(capsys.readouterr().out.split())
+    for spec in SPECS:
+        assert f"{flags_of(spec)[0]} " in shown
+        assert about_of(spec).help in shown
+    assert f"what stands in the area: {', '.join(ARENAS)}, or an MJCF file" in shown
 
 
 @pytest.mark.parametrize(

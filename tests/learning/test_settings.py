@@ -21,6 +21,21 @@ def test_settings_come_back_from_json_as_they_were(credit, preset):
     assert read_json(json.dumps(asdict(training)), Training) == training
 
 
+def test_settings_are_read_by_their_former_names_and_without_fields_that_are_newer():
+    """As a run's `settings.json` of an earlier release has them."""
+    training = usual_settings("team", paper("stationary", failure_fraction=0.2), (10,))
+    stored = asdict(training)
+    stored["arm"] = stored.pop("credit_assignment")
+    stored["parts"] = stored.pop("components")
+    stored["mission"]["switched_off"] = stored["mission"].pop("failure_fraction")
+    stored["mission"]["known"] = stored["mission"].pop("prior_knowledge")
+    del stored["mission"]["map_offset_m"], stored["ppo"]["silent_share"]
+    assert read_json(json.dumps(stored), Training) == training
+    del stored["robots"]
+    with pytest.raises(ValueError, match="missing required field `robots`"):
+        read_json(json.dumps(stored), Training)
+
+
 def test_credit_per_team_is_the_papers():
     """III-C: K = 5; what PPO is given is tested beside PPO."""
     training = usual_settings("team", paper("stationary"), (40,))

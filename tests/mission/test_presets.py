@@ -1,10 +1,12 @@
 """Presets against the paper's text, its authors' code and the sources of their channels."""
 
 import math
+from typing import get_args
 
 import pytest
 
-from swarm_mj.mission import PRESETS, WORLDS, paper, reference
+from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper, reference
+from swarm_mj.mission.specification import Preset
 from swarm_mj.physics.arenas import BUILDING
 from swarm_mj.radio.free_space import path_loss_db
 
@@ -21,6 +23,38 @@ CODE = {
     "half_duplex": "eavesdroppers", "flocking_set": "moving", "silence_is_attempt": True,
     "moves_each_transmission": True, "tree_root_transmits": True,
 }  # fmt: skip
+
+
+def test_every_name_of_a_preset_makes_missions_of_that_name():
+    assert tuple(PRESETS) == get_args(Preset)
+    assert {name: make().preset for name, make in PRESETS.items()} == {
+        name: name for name in PRESETS
+    }
+
+
+def test_a_mission_is_made_of_a_task_of_a_preset_or_of_another_mission():
+    assert make_mission() == paper()
+    assert make_mission("stationary") == make_mission(task="stationary") == paper("stationary")
+    assert make_mission(preset="urban") == PRESETS["urban"]("random-walk")
+    assert make_mission("flocking", preset="urban", num_robots=9).num_robots == 9
+    walk = reference("random-walk", num_robots=7)
+    assert make_mission(walk) == make_mission(walk, preset="reference") == walk
+    assert make_mission(walk, num_robots=8) == reference("random-walk", num_robots=8)
+
+
+@pytest.mark.parametrize(
+    ("given", "named", "complaint"),
+    [
+        ((), {"preset": "urbann"}, "preset must be one of .* not 'urbann'; did you mean urban"),
+        ((Mission(),), {"preset": "urban"}, "is given whole, from the preset paper; leave it out"),
+        (("flocking",), {"task": "flocking"}, "multiple values for keyword argument 'task'"),
+        ((), {"num_robot": 3}, "did you mean num_robots"),
+        ((Mission(),), {"num_robot": 3}, "did you mean num_robots"),
+    ],
+)
+def test_no_mission_is_made_of_what_contradicts_or_is_unknown(given, named, complaint):
+    with pytest.raises((ValueError, TypeError), match=complaint):
+        make_mission(*given, **named)
 
 
 @pytest.mark.parametrize("task", TASKS)

@@ -3,25 +3,26 @@
 import math
 import runpy
 from dataclasses import FrozenInstanceError, fields
+from typing import Literal, get_args, get_origin
 
 import numpy as np
 import pytest
 
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
-from swarm_mj.system.fields import kind_of
+from swarm_mj.system.fields import about_of, former_names, kind_of
 
 # As users load it: without the type checks that these tests run under, which would answer first.
 Unchecked = runpy.run_path(mission_module.__file__)["Mission"]
 
-QUANTITIES = [spec for spec in fields(Mission) if "low" in spec.metadata]
-CHOICES = [spec for spec in fields(Mission) if "choices" in spec.metadata]
+QUANTITIES = [spec for spec in fields(Mission) if about_of(spec).has_range]
+CHOICES = [spec for spec in fields(Mission) if about_of(spec).choices]
 SUSPECTS = [0, 1, -1, -(10**12), 10**15, math.nan, math.inf, -math.inf]
 
 
 def beyond(spec):
     """Values outside a field's range: the usual suspects, and those just past each end."""
-    low, high = spec.metadata["low"], spec.metadata["high"]
+    low, high = about_of(spec).low, about_of(spec).high
     step = 1 if kind_of(spec) is int else 1e-3 * (high - low)
     suspects = [*SUSPECTS, low - step, high + step]
     return [
@@ -69,6 +70,68 @@ def test_the_bare_mission_is_the_papers_text_with_walls():
     assert Mission() == paper("flocking", boundary="reflect")
 
 
+# Fields that are no options: what the paper fixes, and where its text and its authors' code differ.
+NO_OPTIONS = {
+    "density_per_km2",
+    "max_acceleration_mps2",
+    "window_s",
+    "frequency_hz",
+    "wall_hit",
+    "half_duplex",
+    "flocking_set",
+    "silence_is_attempt",
+    "moves_each_transmission",
+    "tree_recomputed",
+    "tree_root_transmits",
+}
+
+
+def test_a_field_is_an_option_unless_it_is_known_to_be_none():
+    assert {spec.name for spec in fields(Mission) if not about_of(spec).help} == NO_OPTIONS
+
+
+@pytest.mark.parametrize("spec", fields(Mission), ids=lambda spec: spec.name)
+def test_every_field_names_its_source_and_the_choices_of_its_type(spec):
+    about = about_of(spec)
+    assert about.source
+    if get_origin(spec.type) is Literal:
+        assert about.choices == get_args(spec.type)
+
+
+CHANNEL_FIELDS = [
+    spec for spec in fields(Mission) if about_of(spec).group == mission_module.CHANNEL
+]
+
+
+@pytest.mark.parametrize("spec", CHANNEL_FIELDS, ids=lambda spec: spec.name)
+def test_every_field_of_the_channel_is_an_option_with_its_choices_or_unit_and_range(spec):
+    about = about_of(spec)
+    assert about.help
+    assert about.choices or (about.unit and about.has_range)
+
+
+def test_what_counts_with_another_field_counts_with_one_that_is_there_and_is_off():
+    """That the other one is there is checked as the class is made; so is its choice."""
+    names = {spec.name for spec in fields(Mission)}
+    switches = {spec.name: about_of(spec).counts_with for spec in fields(Mission)}
+    on = {name: switch for name, switch in switches.items() if switch}
+    assert {switch.name for switch in on.values()} < names
+    assert not any(switch.is_on(paper()) for switch in on.values())
+    assert {name: switch.name for name, switch in on.items() if switch.state} == {
+        "loss_exponent": "path_loss",
+        "reference_m": "path_loss",
+        "antenna_height_m": "path_loss",
+        "rician_k": "fading",
+        "map_offset_m": "prior_knowledge",
+    }
+
+
+@pytest.mark.parametrize(("former", "present"), former_names(Mission).items())
+def test_a_former_name_leads_to_the_present_one(former, present):
+    with pytest.raises(TypeError, match=f"'{former}'; did you mean {present}?"):
+        Unchecked(**{former: 0.5})
+
+
 # What the paper's missions have none of.
 NOTHING_UNLESS_ASKED = {
     "failure_fraction",
@@ -85,19 +148,20 @@ NOTHING_UNLESS_ASKED = {
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
 def test_every_quantity_names_its_unit_and_source(spec):
-    assert spec.metadata["label"]
-    assert spec.metadata["unit"]
-    assert spec.metadata["source"]
+    about = about_of(spec)
+    assert about.label
+    assert about.unit
+    assert about.source
     if spec.default is None:  # without a limit
         return
-    assert spec.metadata["low"] <= spec.default < spec.metadata["high"]
-    assert (spec.metadata["low"] == spec.default) == (spec.name in NOTHING_UNLESS_ASKED)
+    assert about.low <= spec.default < about.high
+    assert (about.low == spec.default) == (spec.name in NOTHING_UNLESS_ASKED)
 
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_the_ends_of_a_range_are_allowed(spec, end):
-    value = kind_of(spec)(spec.metadata[end])
+    value = kind_of(spec)(getattr(about_of(spec), end))
     assert getattr(Mission(**{spec.name: value}), spec.name) == value
 
 
@@ -105,12 +169,13 @@ def test_the_ends_of_a_range_are_allowed(spec, end):
     ("spec", "value"), REFUSED, ids=[f"{spec.name}={value:g}" for spec, value in REFUSED]
 )
 def test_values_outside_their_range_are_refused(spec, value):
-    with pytest.raises(ValueError, match=spec.metadata["label"]) as refusal:
+    with pytest.raises(ValueError, match=about_of(spec).label) as refusal:
         Unchecked(**{spec.name: value})
     message = str(refusal.value)
     allowed, given = message.rsplit("not", 1)
-    assert f"from {spec.metadata['low']:g} to {spec.metadata['high']:g}" in allowed
-    assert spec.metadata["unit"] in allowed
+    about = about_of(spec)
+    assert f"from {about.low:g} to {about.high:g}" in allowed
+    assert about.unit in allowed
     assert float(given) == pytest.approx(value, rel=1e-5, nan_ok=True)
 
 
@@ -135,10 +200,10 @@ def test_numpy_s_numbers_are_numbers():
 
 @pytest.mark.parametrize("spec", CHOICES, ids=lambda spec: spec.name)
 def test_unknown_choices_are_refused(spec):
-    with pytest.raises(ValueError, match=spec.metadata["label"]) as refusal:
+    with pytest.raises(ValueError, match=about_of(spec).label) as refusal:
         Unchecked(**{spec.name: "telepathy"})
     assert "'telepathy'" in str(refusal.value)
-    for choice in spec.metadata["choices"]:
+    for choice in about_of(spec).choices:
         assert choice in str(refusal.value)
         assert getattr(Unchecked(**{spec.name: choice}), spec.name) == choice
 

@@ -8,7 +8,7 @@ import pytest
 
 import swarm_mj
 from swarm_mj.mission import paper, reference
-from swarm_mj.mission.presets import world
+from swarm_mj.mission.presets import open_field
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
@@ -23,7 +23,7 @@ CHANNELS = {
         erasure=0.2,
         burst_begin=0.1,
     ),
-    "open-field": world("open-field", num_robots=12, num_windows=30),
+    "open-field": open_field(num_robots=12, num_windows=30),
     "authors": reference("stationary", num_robots=12, num_windows=30),
 }
 

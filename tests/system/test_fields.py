@@ -1,25 +1,24 @@
 """Values that are checked where they are declared."""
 
 import json
-import re
-from dataclasses import asdict, dataclass
-from pathlib import Path
+from dataclasses import asdict, dataclass, fields
 from typing import Literal
 
 import numpy as np
 import pytest
 
 from swarm_mj.system.fields import (
-    FORMER_NAMES,
-    GONE_IN,
+    about_of,
+    above_zero,
     check,
+    check_names,
     did_you_mean,
+    former_names,
     kind_of,
     same_as,
+    set_to,
     setting,
 )
-
-ROOT = Path(__file__).parents[2]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -86,10 +85,47 @@ def test_the_name_that_was_meant_holds_the_word_or_is_like_it(typed, meant):
     assert did_you_mean(typed, known) == f"; did you mean {meant}?"
 
 
-def test_former_names_are_listed_with_the_date_until_when_they_work():
-    options = (ROOT / "docs/options.md").read_text().split("## Former names")[1].split("\n## ")[0]
-    rows = re.findall(r"\| `(\w+)` \| `(\w+)` \|$", options, re.MULTILINE)
-    assert dict(rows) == FORMER_NAMES
-    for page in (options, (ROOT / "CHANGELOG.md").read_text()):
-        assert GONE_IN in " ".join(page.split())
-        assert all(f"`{name}`" in page or f"`--{name}" in page for name in FORMER_NAMES)
+@dataclass(frozen=True, kw_only=True)
+class Oven:
+    """Settings of which some count with others, and some were called otherwise."""
+
+    heat: str = setting("none", choices=("none", "top", "fan"), former=("warmth", "temperature"))
+    fan_rpm: float = setting(900.0, low=1.0, high=3000.0, counts_with=set_to(heat, "fan"))
+    steam: float = setting(0.0, low=0.0, high=1.0)
+    steam_s: float = setting(5.0, low=1.0, high=60.0, counts_with=above_zero(steam))
+    light: bool = False
+
+
+def test_a_field_says_with_which_other_one_it_counts():
+    switches = {spec.name: about_of(spec).counts_with for spec in fields(Oven)}
+    assert {name: each.name for name, each in switches.items() if each} == {
+        "fan_rpm": "heat",
+        "steam_s": "steam",
+    }
+    for oven, counting in (
+        (Oven(heat="top"), set()),
+        (Oven(heat="fan"), {"fan_rpm"}),
+        (Oven(heat="top,fan", steam=0.5), {"fan_rpm", "steam_s"}),  # of joined choices, one
+    ):
+        assert {name for name, each in switches.items() if each and each.is_on(oven)} == counting
+
+
+def test_a_slip_in_a_declaration_is_an_error_at_once():
+    with pytest.raises(TypeError, match="a range needs both ends, not low=1 and high=None"):
+        setting(3, low=1)
+    with pytest.raises(TypeError, match="needs one of none, top, fan, not 'fann'"):
+        set_to(Oven.__dataclass_fields__["heat"], "fann")
+    with pytest.raises(TypeError, match="needs a number that is a `setting`, not 3"):
+        above_zero(3)
+    with pytest.raises(TypeError, match="needs a number"):  # of a text, nothing is above 0
+        above_zero(Oven.__dataclass_fields__["heat"])
+    with pytest.raises(TypeError, match="unexpected keyword argument 'lable'"):
+        setting(3, lable="a")
+
+
+def test_former_names_lead_to_the_present_ones():
+    former = former_names(Oven)
+    assert former == {"warmth": "heat", "temperature": "heat"}
+    assert former_names(Kettle, Oven) == former
+    with pytest.raises(TypeError, match="argument 'warmth'; did you mean heat"):
+        check_names("Oven", ["warmth"], ["light", "heat"], former)
