@@ -186,7 +186,7 @@ def published(policy: str, mission: Mission) -> dict[str, Point]:
         return {}
     x = getattr(mission, sweep.x_name)
     wanted = (sweep.published, policy, x)
-    found: dict[Cost, Point] = {}
+    found: dict[str, Point] = {}
     for point in points():
         if (point.figure, point.method, point.x) == wanted:
             found[point.cost] = point
