@@ -188,14 +188,15 @@ def test_ticks_are_the_published_places_and_all_curves_are_inside():
     assert high > 72.633
 
 
-LIMITS = ("floor", "training.ceiling:Annealed")  # in a figure of their own, with fewer policies
+# Not in this figure: limits, which have one of their own, with fewer policies, and grey `sotdma`.
+LEFT_OUT = ("floor", "training.ceiling:Annealed", "sotdma")
 
 
 def test_nothing_that_is_written_overlaps_or_leaves_the_page():
     ends = {"range_ratio": 1.0}  # of the published curves
     every = [
         result(policy, aoi_mean=12.0 + 0.1 * n, **ends, payload=PAYLOADS.get(policy))
-        for n, policy in enumerate(sorted({*LOOKS} - {BETTER, *LIMITS}))
+        for n, policy in enumerate(sorted({*LOOKS} - {BETTER, *LEFT_OUT}))
     ]
     drawing = draw(FIG4, every)
     FigureCanvasAgg(drawing).draw()
