@@ -14,7 +14,7 @@ from jaxtyping import Float, Int, UInt64
 
 from swarm_mj.radio.composed import ComposedChannel, Reception, faded_powers, is_lost
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.radio.reception import is_received, sinr
+from swarm_mj.radio.reception import is_received, may_decode, sinr
 from swarm_mj.system.compiled import compiled
 
 AIRTIME = 0.8  # of a slot
@@ -27,14 +27,16 @@ class AsynchronousChannel:
 
     def __init__(self, channel: ComposedChannel, offset: float, drift: float) -> None:
         """Take the greatest offset [slots] and drift [1]; robots' own are drawn uniformly."""
-        self._channel, self._most = channel, (offset, drift)
+        self._channel = channel
+        self._most_offset = offset
+        self._most_drift = drift
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Start new missions; the clocks are drawn after all else."""
         self._channel.start(num_robots, rngs)
         drawn = np.stack([rng.random((2, num_robots)) for rng in rngs])
-        offset, drift = self._most
-        self._offset, self._drift = offset * drawn[:, 0], drift * (2.0 * drawn[:, 1] - 1.0)
+        self._offset = self._most_offset * drawn[:, 0]
+        self._drift = self._most_drift * (2.0 * drawn[:, 1] - 1.0)
         self._silence = np.broadcast_to(np.arange(num_robots), self._offset.shape)
         self._lag = np.zeros((NUM_SLOTS, *self._offset.shape))
         self._recipient = np.stack([self._silence] * NUM_SLOTS)
@@ -61,11 +63,13 @@ class AsynchronousChannel:
     ) -> Int[np.ndarray, "B N"]:
         for kept in (self._lag, self._recipient, self._power_mw):
             kept[:-1] = kept[1:]
-        key, rule = self._channel.key, self._channel.reception
+        key = self._channel.key
+        rule = self._channel.reception
         is_sender = recipient != self._silence
         mean_mw = self._channel.received_mw(position_m, mission, is_sender)
         faded_powers(mean_mw, is_sender, slot, key, rule, self._power_mw[-1])
-        self._lag[-1], self._recipient[-1] = self.lag(slot), recipient
+        self._lag[-1] = self.lag(slot)
+        self._recipient[-1] = recipient
         return decode_overlapping(self._lag, self._recipient, self._power_mw, slot, key, rule)
 
     def split(
@@ -75,11 +79,13 @@ class AsynchronousChannel:
 
         All are [B, N]; `heard` is what was decoded in this slot.
         """
-        is_late, silence = self._lag > GUARD, self._silence
+        is_late = self._lag > GUARD
+        silence = self._silence
         late = np.where(is_late[-2], self._recipient[-2], silence)
         punctual = np.where(is_late[-1], silence, self._recipient[-1])
         came_late = np.take_along_axis(late, heard, axis=1) != heard
-        heard_late, heard_now = np.where(came_late, (heard, silence), (silence, heard))
+        heard_late = np.where(came_late, heard, silence)
+        heard_now = np.where(came_late, silence, heard)
         return (late, heard_late), (punctual, heard_now)
 
 
@@ -94,18 +100,23 @@ def decode_overlapping(
 ) -> Int[np.ndarray, "B N"]:
     """Return the sender of the strongest packet that ends now and decodes, at each receiver.
 
-    Robots that are silent have no power.
+    Robots that are silent have no power. No `Air` as in `composed`: what interferes differs from
+    packet to packet, as each overlaps others in part.
     """
     _, num_missions, num_robots = lag.shape
     heard = np.empty((num_missions, num_robots), dtype=np.int64)
     for b in range(num_missions):
         for j in range(num_robots):
-            heard[b, j], strongest_mw = j, 0.0
+            heard[b, j] = j
+            strongest_mw = 0.0
             for p in range(1, NUM_SLOTS):
                 for i in range(num_robots):
-                    is_late, signal_mw = lag[p, b, i] > GUARD, power_mw[p, b, i, j]
-                    if is_late == (p == NUM_SLOTS - 1) or signal_mw <= strongest_mw:
+                    is_late = lag[p, b, i] > GUARD
+                    ends_later = is_late == (p == NUM_SLOTS - 1)
+                    signal_mw = power_mw[p, b, i, j]
+                    if ends_later or signal_mw <= strongest_mw:
                         continue
+                    # What noise alone drowns needs no sum over others, which costs most here.
                     over_noise = sinr(signal_mw, 0.0, rule.noise_mw)
                     if not is_received(over_noise, rule.threshold):
                         continue
@@ -115,7 +126,8 @@ def decode_overlapping(
                     ratio = sinr(signal_mw, jam_mw, rule.noise_mw)
                     is_clear = is_received(ratio, rule.threshold)
                     if is_clear and not is_lost(i, j, key[b], slot[b], rule):
-                        heard[b, j], strongest_mw = i, signal_mw
+                        heard[b, j] = i
+                        strongest_mw = signal_mw
     return heard
 
 
@@ -134,7 +146,8 @@ def _interference(
     It is infinite if j transmits meanwhile, unless it hears all the same.
     """
     total_mw = 0.0
-    hears = rule.recipient_hears_while_sending and recipient[p, i] == j
+    hears_while_sending = rule.recipient_hears_while_sending
+    hears = may_decode(False, recipient[p, i], j, hears_while_sending)
     for q in range(NUM_SLOTS):
         for k in range(recipient.shape[1]):
             if recipient[q, k] == k or k == i:

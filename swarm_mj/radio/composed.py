@@ -22,10 +22,20 @@ from swarm_mj.radio.fading import (
 )
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.power_law import MeanPowers, PowerLaw, compute_powers, no_powers, place_robots
-from swarm_mj.radio.reception import Air, add_to_air, decoded, incoming_at, silent_air
+from swarm_mj.radio.reception import (
+    Air,
+    add_to_air,
+    decoded,
+    incoming_at,
+    may_decode,
+    silent_air,
+)
 from swarm_mj.system.compiled import compiled
 
-_FADES, _ERASURES, _BURSTS = np.uint64(1), np.uint64(2), np.uint64(3)  # what a key is used for
+# What a mission's key is used for.
+_FADES = np.uint64(1)
+_ERASURES = np.uint64(2)
+_BURSTS = np.uint64(3)
 
 
 class Reception(NamedTuple):
@@ -57,7 +67,8 @@ class ComposedChannel:
     ) -> None:
         self.reception = reception
         self._law = law
-        self._shadowing_db, self._shadowing_distance_m = shadowing_db, shadowing_distance_m
+        self._shadowing_db = shadowing_db
+        self._shadowing_distance_m = shadowing_distance_m
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Start new missions; one generator each, from which its own shadowing is drawn, too."""
@@ -65,8 +76,9 @@ class ComposedChannel:
         self._powers_mw = no_powers(self._law, len(rngs))
         self._waves: Waves | None = None
         if self._shadowing_db > 0.0:
-            std_db, correlation_m = self._shadowing_db, self._shadowing_distance_m
-            self._waves = draw_waves(std_db, correlation_m, num_robots, rngs)
+            self._waves = draw_waves(
+                self._shadowing_db, self._shadowing_distance_m, num_robots, rngs
+            )
 
     def at(self, slot: Int[np.ndarray, "W"], mission: Int[np.ndarray, "W"]) -> Channel:
         """Return the channel of W rows: of each its slot and its mission, counted from 0."""
@@ -158,7 +170,9 @@ def _decode(
         air = _faded_air(received_mw[mission[w]], recipient[w], key, slot[w], rule)
         for j in range(num_robots):
             i = decoded(incoming_at(air, j), j, rule.noise_mw, rule.threshold)
-            heard[w, j] = j if i == j or is_lost(i, j, key, slot[w], rule) else i
+            if i != j and is_lost(i, j, key, slot[w], rule):
+                i = j
+            heard[w, j] = i
     return heard
 
 
@@ -170,8 +184,8 @@ def _faded_air(
     slot: int,
     rule: Reception,
 ) -> Air:
-    fades = mixed(mixed(key, _FADES), np.uint64(slot))
-    hears_while_sending = rule.recipient_hears_while_sending
+    """Return the packets of a slot at every receiver, after their fades."""
+    fades = _key_in_slot(key, _FADES, slot)
     air = silent_air(recipient.shape[0])
     for i in range(recipient.shape[0]):  # by sender: the powers of one stand side by side
         if recipient[i] == i:
@@ -179,8 +193,10 @@ def _faded_air(
         for j in range(recipient.shape[0]):
             if j != i:
                 power_mw = _faded(received_mw[i, j], fades, i, j, rule)
-                may_hear = recipient[j] == j or (hears_while_sending and recipient[i] == j)
-                add_to_air(air, i, j, power_mw if may_hear else 0.0, power_mw)
+                is_silent = recipient[j] == j
+                hears_while_sending = rule.recipient_hears_while_sending
+                is_open = may_decode(is_silent, recipient[i], j, hears_while_sending)
+                add_to_air(air, i, j, power_mw if is_open else 0.0, power_mw)
     return air
 
 
@@ -196,12 +212,19 @@ def faded_powers(
     """Fill in the power of each packet at each other robot [mW]; 0 of a robot that is silent."""
     num_missions, num_robots = is_sender.shape
     for b in range(num_missions):
-        fades = mixed(mixed(key[b], _FADES), np.uint64(slot[b]))
+        fades = _key_in_slot(key[b], _FADES, slot[b])
         for i in range(num_robots):
             for j in range(num_robots):
-                is_heard = is_sender[b, i] and i != j
-                mean_mw = received_mw[b, i, j]
-                power_mw[b, i, j] = _faded(mean_mw, fades, i, j, rule) if is_heard else 0.0
+                if is_sender[b, i] and i != j:
+                    power_mw[b, i, j] = _faded(received_mw[b, i, j], fades, i, j, rule)
+                else:
+                    power_mw[b, i, j] = 0.0
+
+
+@compiled()
+def _key_in_slot(key: np.uint64, purpose: np.uint64, slot: int) -> np.uint64:
+    """Return a mission's key for one purpose in one slot."""
+    return mixed(mixed(key, purpose), np.uint64(slot))
 
 
 @compiled()
@@ -215,8 +238,11 @@ def _faded(power_mw: float, fades: np.uint64, i: int, j: int, rule: Reception) -
 def is_lost(i: int, j: int, key: np.uint64, slot: int, rule: Reception) -> bool:
     """Return whether j loses i's packet although it is strong enough."""
     if rule.erasure > 0.0:
-        erasures = mixed(mixed(key, _ERASURES), np.uint64(slot))
-        if keyed_uniform(mixed(mixed(erasures, np.uint64(i)), np.uint64(j))) < rule.erasure:
+        erasures = _key_in_slot(key, _ERASURES, slot)
+        packet = mixed(mixed(erasures, np.uint64(i)), np.uint64(j))
+        if keyed_uniform(packet) < rule.erasure:
             return True
+    if rule.burst_begin == 0.0:
+        return False
     bursts = mixed(mixed(key, _BURSTS), np.uint64(j))
-    return rule.burst_begin > 0.0 and is_in_burst(bursts, slot, rule.burst_begin, rule.burst_end)
+    return is_in_burst(bursts, slot, rule.burst_begin, rule.burst_end)

@@ -28,8 +28,11 @@ NO_FADING = math.inf  # K without scattered waves, linear
 
 # All unsigned: of a signed and an unsigned integer numba makes a float.
 _WEYL = np.uint64(0x9E3779B97F4A7C15)  # SplitMix64's increment: 2^64 over the golden ratio
-_MIX_1, _MIX_2 = np.uint64(0xBF58476D1CE4E5B9), np.uint64(0x94D049BB133111EB)
-_SHIFT_27, _SHIFT_30, _SHIFT_31 = np.uint64(27), np.uint64(30), np.uint64(31)
+_MIX_1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX_2 = np.uint64(0x94D049BB133111EB)
+_SHIFT_27 = np.uint64(27)
+_SHIFT_30 = np.uint64(30)
+_SHIFT_31 = np.uint64(31)
 _SPARE_BITS = np.uint64(11)  # of 64, beyond those of a float's mantissa
 _UNIT = 2.0**-53  # the last of these
 NUM_WAVES = 64
@@ -126,19 +129,22 @@ def draw_waves(
     """
 
     def wave_numbers(rng: np.random.Generator) -> Float[np.ndarray, "W 2"]:
-        uniform, angle = rng.random(NUM_WAVES), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES)
+        uniform = rng.random(NUM_WAVES)
+        angle = rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES)
         number = np.sqrt(1.0 / (1.0 - uniform) ** 2 - 1.0) / correlation_m
         return number[:, None] * np.stack([np.cos(angle), np.sin(angle)], axis=1)
 
-    drawn = [
-        (wave_numbers(rng), wave_numbers(rng), rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES))
-        for rng in rngs
-    ]
-    first_end, other_end, phase = map(np.stack, zip(*drawn, strict=True))
+    first_end: list[np.ndarray] = []
+    other_end: list[np.ndarray] = []
+    phase: list[np.ndarray] = []
+    for rng in rngs:
+        first_end.append(wave_numbers(rng))
+        other_end.append(wave_numbers(rng))
+        phase.append(rng.uniform(0.0, 2.0 * np.pi, NUM_WAVES))
     return Waves(
-        first_end=first_end,
-        other_end=other_end,
-        phase=phase,
+        first_end=np.stack(first_end),
+        other_end=np.stack(other_end),
+        phase=np.stack(phase),
         place=np.full((len(rngs), num_robots, 2), np.nan),
         ends=np.empty((len(rngs), num_robots, NUM_ENDS, NUM_WAVES), dtype=np.float32),
         step_m=correlation_m / STEPS_PER_CORRELATION,
@@ -149,18 +155,25 @@ def draw_waves(
 @compiled()
 def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) -> None:
     """Bring mission b's waves to where its robots are; cosines, which cost most, once a place."""
-    first_end, other_end, phase = waves.first_end[b], waves.other_end[b], waves.phase[b]
+    first_end = waves.first_end[b]
+    other_end = waves.other_end[b]
+    phase = waves.phase[b]
     for i in range(position_m.shape[0]):
         x = np.floor(position_m[i, 0] / waves.step_m + 0.5)
         y = np.floor(position_m[i, 1] / waves.step_m + 0.5)
         if x != waves.place[b, i, 0] or y != waves.place[b, i, 1]:
-            waves.place[b, i, 0], waves.place[b, i, 1] = x, y
-            x_m, y_m, ends = x * waves.step_m, y * waves.step_m, waves.ends[b, i]
+            waves.place[b, i, 0] = x
+            waves.place[b, i, 1] = y
+            x_m = x * waves.step_m
+            y_m = y * waves.step_m
+            ends = waves.ends[b, i]
             for w in range(phase.shape[0]):
                 first = first_end[w, 0] * x_m + first_end[w, 1] * y_m
                 other = other_end[w, 0] * x_m + other_end[w, 1] * y_m + phase[w]
-                ends[FIRST_COS, w], ends[FIRST_SIN, w] = math.cos(first), math.sin(first)
-                ends[OTHER_COS, w], ends[OTHER_SIN, w] = math.cos(other), math.sin(other)
+                ends[FIRST_COS, w] = math.cos(first)
+                ends[FIRST_SIN, w] = math.sin(first)
+                ends[OTHER_COS, w] = math.cos(other)
+                ends[OTHER_SIN, w] = math.sin(other)
 
 
 @compiled()

@@ -14,22 +14,40 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from swarm_mj.mission.geometry import squared_distance
-from swarm_mj.radio.reception import Incoming, add_packet, decoded, received_power
+from swarm_mj.radio.reception import (
+    Incoming,
+    add_packet,
+    decoded,
+    may_decode,
+    received_power,
+)
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
 
 
 @runtime_checkable
 class Channel(Protocol):
-    """Who decodes whom (f of Eq. 6): the protocol takes any of these."""
+    """Who decodes whom (f of Eq. 6): the protocol takes any of these, a plain function too.
+
+    Example:
+        >>> import numpy as np
+        >>> def everyone_hears_robot_0(position_m, recipient):
+        ...     heard = np.tile(np.arange(recipient.shape[1]), (len(recipient), 1))
+        ...     return np.where(recipient[:, :1] != 0, 0, heard)
+    """
 
     def __call__(
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
-        """Return the sender that each robot decodes; itself is nobody.
+        """Return the sender that each robot decodes.
 
-        Each robot addresses its recipient, or with -1 everyone; itself is silence. A robot that
-        transmits may decode another's packet; nobody decodes a robot that is silent.
+        Args:
+            position_m: Where each robot is [m], [B N 2]: missions, robots, axes.
+            recipient: Whom each robot addresses, [B N]; -1 is everyone, and itself is silence.
+
+        Returns:
+            The sender that each robot decodes, [B N]; itself is nobody. A robot that transmits may
+            decode another's packet; nobody decodes a robot that is silent.
         """
         ...
 
@@ -39,7 +57,15 @@ class VaryingChannel(Protocol):
     """A channel that is another one in every slot, and the same again when a slot is replayed."""
 
     def at(self, slot: Int[np.ndarray, "B"], mission: Int[np.ndarray, "B"], /) -> Channel:
-        """Return the channel of one slot: each row's (a window has two), in each row's mission."""
+        """Return the channel of one slot in each row; a window has two slots.
+
+        Args:
+            slot: Of each row, counted from the mission's start, [B].
+            mission: Of each row, counted from 0, [B].
+
+        Returns:
+            What decodes in these slots; it is called once.
+        """
         ...
 
 
@@ -68,6 +94,20 @@ class FreeSpaceRadio:
     Eq. 3 counts a robot's own signal as interference, so a transmitter hears nothing. The authors'
     code exempts the addressed recipient: `recipient_hears_while_sending`. Of several packets above
     the threshold, possible only below 0 dB, a robot decodes the strongest (III-B).
+
+    Args:
+        power_mw: Transmit power of every robot, rho [mW].
+        noise_mw: Noise power, sigma [mW].
+        threshold: Least SINR that decodes, linear [1].
+        frequency_hz: Centre frequency, nu [Hz].
+        recipient_hears_while_sending: Whether the robot that is addressed decodes while it sends.
+
+    Example:
+        >>> import numpy as np
+        >>> radio = FreeSpaceRadio(power_mw=8e3, noise_mw=1e-5, threshold=1.26, frequency_hz=2.4e9)
+        >>> position_m = np.array([[[0.0, 0.0], [100.0, 0.0], [900.0, 0.0]]])
+        >>> radio(position_m, np.array([[-1, 1, 2]])).tolist()  # robot 0 broadcasts
+        [[0, 0, 2]]
     """
 
     power_mw: float  # rho: transmit power of every robot [mW]
@@ -84,14 +124,25 @@ class FreeSpaceRadio:
     @cached_property
     def rule(self) -> tuple[float, float, float, bool]:
         """The last arguments of `decode_strongest`."""
-        power_mw, hears = self.received_at_1_m_mw, self.recipient_hears_while_sending
-        return power_mw, self.noise_mw, self.threshold, hears
+        return (
+            self.received_at_1_m_mw,
+            self.noise_mw,
+            self.threshold,
+            self.recipient_hears_while_sending,
+        )
 
     def __call__(
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes (Eqs. 1-4); arguments as in `Channel`."""
-        return decode_strongest(position_m, recipient, *self.rule)
+        return decode_strongest(
+            position_m,
+            recipient,
+            self.received_at_1_m_mw,
+            self.noise_mw,
+            self.threshold,
+            self.recipient_hears_while_sending,
+        )
 
 
 @compiled()
@@ -127,7 +178,8 @@ def decode_strongest(
                 if i != j:
                     apart_m2 = squared_distance(position_m[b], i, j)
                     power_mw = received_power(received_at_1_m_mw, apart_m2)
-                    is_open = is_silent or (hears_while_sending and recipient[b, i] == j)
-                    incoming = add_packet(incoming, i, power_mw if is_open else 0.0, power_mw)
+                    is_open = may_decode(is_silent, recipient[b, i], j, hears_while_sending)
+                    signal_mw = power_mw if is_open else 0.0
+                    incoming = add_packet(incoming, i, signal_mw, power_mw)
             heard[b, j] = decoded(incoming, j, noise_mw, threshold)
     return heard

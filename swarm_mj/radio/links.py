@@ -34,7 +34,8 @@ MAX_MARGIN_DB = 80.0  # up to which a fade's own distribution is worked out
 FINE_STEP_DB = 0.01  # and how finely
 STD_STEP_DB = 0.5
 MAX_STD_DB = 12.0
-SIGMAS, SIGMA_STEP = 4.0, 0.05  # how far a normal distribution is followed, and how finely
+SIGMAS = 4.0  # how far a normal distribution is followed
+SIGMA_STEP = 0.05  # and how finely
 LEAST_PROBABILITY = 0.02  # what is less counts as 0, which spares schedulers hopeless links
 
 ROUNDING = 1e-9  # more than sums, products and chances lose by rounding, as a share
@@ -70,9 +71,16 @@ def links_between(
 ) -> Links:
     """Return the links between robots at believed positions.
 
-    Each belief has a standard deviation `spread_m`; None: the positions are true. Robots that are
-    not known to be anywhere hear nothing and are not heard; None: everyone is known. The law is
-    that of mean powers [mW]; None: the radio's in free space.
+    Args:
+        radio: Whose powers, noise and threshold they have.
+        position_m: Where each robot is believed to be [m], [N 2].
+        spread_m: Standard deviation of each belief [m], [N]; None: the positions are true.
+        is_known: Whether a robot is known to be anywhere, [N]; others hear nothing and are not
+            heard. None: everyone is known.
+        law: Of mean powers [mW]; None: the radio's in free space.
+
+    Returns:
+        The links, without doubts about powers.
     """
     num_robots = len(position_m)
     if law is None:
@@ -139,7 +147,8 @@ def air_of(links: Links, transmits: Bool[np.ndarray, "N"]) -> Air:
 @compiled(forceinline=True)
 def incoming_with(links: Links, air: Air, i: int, j: int) -> Incoming:
     """Return all packets at j when i transmits, too; a robot adds nothing at itself."""
-    signal_mw, interference_mw = links.received_mw[i, j], links.interference_mw[i, j]
+    signal_mw = links.received_mw[i, j]
+    interference_mw = links.interference_mw[i, j]
     return add_packet(incoming_at(air, j), i, signal_mw, interference_mw)
 
 
@@ -175,12 +184,15 @@ def listen(
 
     All of `air` is in the air, and the packet of `also`, unless that is `NOBODY`. `heard` and
     `probability` are overwritten for all robots: by themselves, which is nobody, and by 0 for
-    those that transmit or do not listen.
+    those that transmit or do not listen. Not `reception.decoded`: a chance takes its place, and
+    what is not counted on as a signal interferes all the same.
     """
     for j in range(listens.shape[0]):
-        heard[j], probability[j] = j, 0.0
+        heard[j] = j
+        probability[j] = 0.0
         if listens[j] and j != also:
-            incoming = incoming_with(links, air, j if also == NOBODY else also, j)
+            added = j if also == NOBODY else also
+            incoming = incoming_with(links, air, added, j)
             if incoming.strongest > 0.0:
                 probability[j] = chance_of_strongest(links, incoming, j)
                 heard[j] = incoming.sender if probability[j] > 0.0 else j

@@ -31,7 +31,8 @@ def obstruct(
     """Multiply i's power at all others by what obstacles leave, at the antennas' height [m]."""
     if obstacles is None:  # code for obstacles is then not even compiled
         return
-    x, y = position_m[i, 0], position_m[i, 1]
+    x = position_m[i, 0]
+    y = position_m[i, 1]
     for j in range(position_m.shape[0]):
         if j != i:
             along_m = (position_m[j, 0] - x, position_m[j, 1] - y, 0.0)
@@ -46,7 +47,8 @@ def blocked(
     touches = np.zeros(position_m.shape[0], dtype=np.bool_)
     for i in range(position_m.shape[0]):
         for turn in range(4):
-            x, y = math.cos(0.25 * math.pi * turn), math.sin(0.25 * math.pi * turn)
+            x = math.cos(0.25 * math.pi * turn)
+            y = math.sin(0.25 * math.pi * turn)
             start_m = (position_m[i, 0] - radius_m * x, position_m[i, 1] - radius_m * y, height_m)
             along_m = (2.0 * radius_m * x, 2.0 * radius_m * y, 0.0)
             touches[i] |= _next_crossed(start_m, along_m, 0, obstacles) < obstacles.kind.shape[0]
@@ -78,7 +80,9 @@ def _next_crossed(start_m: Vector, along_m: Vector, first: int, obstacles: Obsta
         y = obstacles.centre_m[o, 1] - start_y
         z = obstacles.centre_m[o, 2] - start_z
         share = min(max((x * along_x + y * along_y + z * along_z) * per_m2, 0.0), 1.0)
-        x, y, z = x - share * along_x, y - share * along_y, z - share * along_z
+        x -= share * along_x
+        y -= share * along_y
+        z -= share * along_z
         is_near = x * x + y * y + z * z <= obstacles.reach_m[o] ** 2
         if is_near and _crosses(start_m, along_m, o, obstacles):
             return o
@@ -88,9 +92,13 @@ def _next_crossed(start_m: Vector, along_m: Vector, first: int, obstacles: Obsta
 @compiled()
 def _crosses(start_m: Vector, along_m: Vector, o: int, obstacles: Obstacles) -> bool:
     """Return whether a line has a point in common with an obstacle."""
-    kind, centre_m, size_m = obstacles.kind[o], obstacles.centre_m[o], obstacles.size_m[o]
+    kind = obstacles.kind[o]
+    centre_m = obstacles.centre_m[o]
+    size_m = obstacles.size_m[o]
     frame = obstacles.rotation[o]
-    dx, dy, dz = start_m[0] - centre_m[0], start_m[1] - centre_m[1], start_m[2] - centre_m[2]
+    dx = start_m[0] - centre_m[0]
+    dy = start_m[1] - centre_m[1]
+    dz = start_m[2] - centre_m[2]
     x, y, z = _turned((dx, dy, dz), frame)
     u, v, w = _turned(along_m, frame)
     if kind == BOX:
@@ -101,7 +109,8 @@ def _crosses(start_m: Vector, along_m: Vector, o: int, obstacles: Obstacles) -> 
     if kind == ELLIPSOID:  # a ball, once every axis is counted in its own half length
         place = (x / size_m[0], y / size_m[1], z / size_m[2])
         return _meets_ball(place, (u / size_m[0], v / size_m[1], w / size_m[2]), 1.0)
-    radius_m, half_m = size_m[0], size_m[1]
+    radius_m = size_m[0]
+    half_m = size_m[1]
     if kind == SPHERE:
         return _meets_ball((x, y, z), (u, v, w), radius_m)
     part = _within(z, w, half_m, (0.0, 1.0))
@@ -128,7 +137,8 @@ def _within(p: float, v: float, half: float, part: Interval) -> Interval:
     """Return the part of an interval of s in which p + s v lies within plus or minus half."""
     if v == 0.0:
         return part if abs(p) <= half else EMPTY
-    near, far = (-half - p) / v, (half - p) / v
+    near = (-half - p) / v
+    far = (half - p) / v
     if near > far:
         near, far = far, near
     return max(part[0], near), min(part[1], far)

@@ -55,6 +55,16 @@ def is_received(signal_to_noise: float, threshold: float) -> bool:
 
 
 @compiled()
+def may_decode(is_silent: bool, addressed: int, j: int, hears_while_sending: bool) -> bool:
+    """Return whether half duplex lets robot j decode a packet that is addressed to some robot.
+
+    Eq. 3 counts a robot's own packet as interference, so a robot that is not silent hears nothing.
+    By the authors' code it hears what is addressed to it all the same: `hears_while_sending`.
+    """
+    return is_silent or (hears_while_sending and addressed == j)
+
+
+@compiled()
 def add_packet(incoming: Incoming, i: int, signal: float, interference: float) -> Incoming:
     """Return what a receiver gets when i transmits, too.
 
@@ -94,7 +104,9 @@ def incoming_at(air: Air, j: int) -> Incoming:
 def add_to_air(air: Air, i: int, j: int, signal: float, interference: float) -> None:
     """Add i's packet to the air at j; powers as in `add_packet`."""
     incoming = add_packet(incoming_at(air, j), i, signal, interference)
-    air.total[j], air.strongest[j], air.sender[j] = incoming
+    air.total[j] = incoming.total
+    air.strongest[j] = incoming.strongest
+    air.sender[j] = incoming.sender
 
 
 @compiled()

@@ -72,7 +72,12 @@ def write_joined(
                 continue
             has_joined[b, i] = 0.0
             if is_known[b, i, owner]:
-                belief = _Belief(believed_m[b, i], at_1_m, FREE_SPACE, threshold)
+                belief = _Belief(
+                    believed_m=believed_m[b, i],
+                    at_1_m=at_1_m,
+                    power=FREE_SPACE,
+                    threshold=threshold,
+                )
                 num_asked = 0
                 while num_asked < num_robots and is_known[b, i, asked[num_asked]]:
                     num_asked += 1
@@ -122,7 +127,9 @@ def keep_joined(
                 if powers is not None:
                     place_robots(powers, b, believed_m[b, i])
                     power = powers.power[b]
-                belief = _Belief(believed_m[b, i], at_1_m, power, threshold)
+                belief = _Belief(
+                    believed_m=believed_m[b, i], at_1_m=at_1_m, power=power, threshold=threshold
+                )
                 is_sending[b, i] = _senders(owner, asked, i, belief, powers, b)[i]
         is_sending[b, owner] = True
 
@@ -145,8 +152,13 @@ def _senders(
     """Return who sends: the owner of the turn, and who joins it up to the `last` that is asked."""
     num_robots = belief.believed_m.shape[0]
     is_sender = np.zeros(num_robots, dtype=np.bool_)
-    near_m2, believed_m = np.zeros(num_robots), belief.believed_m
-    slot = _Slot(is_sender, np.zeros(num_robots), np.zeros(num_robots), near_m2)
+    near_m2 = np.zeros(num_robots)
+    slot = _Slot(
+        is_sender=is_sender,
+        signal=np.zeros(num_robots),
+        total=np.zeros(num_robots),
+        near_m2=near_m2,
+    )
     if powers is not None:
         compute_powers(powers, b, owner)
         compute_powers(powers, b, last)
@@ -159,7 +171,7 @@ def _senders(
         # A sender that is asked again may not join either: nobody would gain by it.
         if powers is not None and slot.signal[k] == 0.0:
             compute_powers(powers, b, k)
-        is_near = squared_distance(believed_m, k, refuser) < near_m2[refuser]
+        is_near = squared_distance(belief.believed_m, k, refuser) < near_m2[refuser]
         found = refuser if is_near else _refuser(k, refuser, belief, slot)
         if found == NOBODY:
             _join(k, belief, slot)
@@ -177,7 +189,9 @@ def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
     The `first` is looked at first: who is in the way of one robot is likely to be in the way of
     the next, and nearly all robots are refused.
     """
-    is_sender, signal, total, _ = slot
+    is_sender = slot.is_sender
+    signal = slot.signal
+    total = slot.total
     if signal[k] > 0.0:
         return k
     is_of_use = False
@@ -199,7 +213,10 @@ def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
 @compiled()
 def _join(k: int, belief: _Belief, slot: _Slot) -> None:
     """Make k a sender: mark whom it reaches, and add its packet to the air."""
-    is_sender, signal, total, near_m2 = slot
+    is_sender = slot.is_sender
+    signal = slot.signal
+    total = slot.total
+    near_m2 = slot.near_m2
     is_sender[k] = True
     for j in range(signal.shape[0]):
         if j != k:
