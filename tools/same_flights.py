@@ -124,6 +124,14 @@ class Shake:
         return np.stack([rng.normal(size=(self._num_robots, 2)) for rng in self._rngs])
 
 
+class Brake:
+    """A controller that stops the robots within a few windows of 100 ms."""
+
+    def __call__(self, buffers: Any, states: Any) -> np.ndarray:  # noqa: ANN401, ARG002 - as above
+        """Return the accelerations [m/s²]."""
+        return -10.0 * states.velocity_mps
+
+
 def two_walls(spec: Any, mission: Any) -> None:  # noqa: ANN401 - as above
     """Add a wall that robots hit, and one that attenuates packets, too."""
     size_m = [5.0, 0.3 * mission.side_m, 5.0]
@@ -364,6 +372,10 @@ FLIGHTS: dict[str, Flight] = {
     "three-robots-planner": flight("planner", "flocking", num_robots=3, num_windows=60),
     "three-robots-sotdma": flight("sotdma", num_robots=3),
     "three-robots-mst": flight("mst", num_robots=3),
+    "52-robots-planner": flight("planner", num_robots=52, num_windows=80),
+    "ten-robots-planner-search": flight(
+        "planner", num_robots=10, range_ratio=0.15, velocity_ratio=3.0, num_windows=200
+    ),
     "six-robots-planner-long": flight("planner", num_robots=6, num_windows=200),
     "40-robots-planner-none": flight(NONE, "stationary", num_robots=40, num_windows=30),
     "40-robots-greedy-oracle": flight("greedy-oracle", num_robots=40, num_windows=20),
@@ -392,6 +404,8 @@ FLIGHTS: dict[str, Flight] = {
     "own-channel-varies": flight("gossip", channel=EverySecondSlot),
     "own-channel-table": flight("tdma", channel=f"table:{GAINS_FILE}"),
     "own-controller": flight("tdma", controller=Gather, velocity_ratio=0.6),
+    "own-controller-planner": flight("planner", "stationary", controller=Gather),
+    "own-controller-brakes": flight("planner", num_robots=6, controller=Brake, num_windows=150),
     "own-controller-draws": flight("gossip", controller=Shake, seeds=(1, 2)),
     "own-scene": flight("tdma", scene="same_flights:two_walls", **CONTACT),
     "own-everything": flight(
@@ -430,6 +444,10 @@ TRAININGS: dict[str, str] = {
     "training-robot-buffer": (
         f"{SHORT} --task stationary --robots 5 7 --features buffer --latent 8 --silence-logit 1"
         " --discount 0.5 --budget 512 --evaluate-every 128"
+    ),
+    "training-robot-local": (
+        f"{SHORT} --task random-walk --robots 6 --features local --edges paper --latent 8"
+        " --silence-logit 1 --preset urban --budget 512 --evaluate-every 128"
     ),
     "training-team-paper": (
         f"{SHORT} --credit team --task random-walk --robots 6 --latent 8"

@@ -8,7 +8,8 @@ with.
 import io
 import json
 import zipfile
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
@@ -22,11 +23,12 @@ from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import policy_of
 from swarm_mj.learning.selection import Progress, candidates
 from swarm_mj.learning.settings import Training
+from swarm_mj.policies.gnn.feature_sets import check_unchanged, known_names
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.reading import open_file, read_json, read_plain
 from swarm_mj.system.writing import write_bytes
 
-CHECKPOINT_VERSION = 5
+CHECKPOINT_VERSION = 5  # that of 1.0.0
 MOMENTS = ("mean", "var", "count")  # of `VecNormalize`'s returns
 
 Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
@@ -38,14 +40,17 @@ def save(
     """Write a checkpoint, between rollouts; raises OSError if the file cannot be written."""
     name, key, *place = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
     batches = env_of(model).batches
-    env, normaliser = model.get_env(), {}  # of rewards
+    env = model.get_env()
+    normaliser = {}  # of rewards
     if isinstance(env, VecNormalize):
-        moments = {name: getattr(env.ret_rms, name) for name in MOMENTS}
-        normaliser = {name: torch.tensor(x, dtype=torch.float64) for name, x in moments.items()}
+        for moment in MOMENTS:
+            value = getattr(env.ret_rms, moment)
+            normaliser[moment] = torch.tensor(value, dtype=torch.float64)
         normaliser["returns"] = torch.tensor(env.returns)
     state = {
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
+        "feature_names": list(known_names(training.features)),
         "progress": asdict(progress),
         "weights": model.policy.state_dict(),
         "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
@@ -70,16 +75,26 @@ def save(
 def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks]:
     """Put a model and its missions back to a checkpoint; return its progress and candidates.
 
-    Raises ValueError if the file cannot be read, or is damaged, foreign, of another version or of
-    other settings.
+    Raises ValueError if the file cannot be read, or is damaged, foreign, of another version, of
+    other settings, or of features that are others now.
     """
     state: Any = read_torch(path)
-    try:
+    with _as_damaged(path):
         if state["version"] != CHECKPOINT_VERSION:
             raise ValueError("another version of swarm_mj wrote it, which can go on with it")
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
+        trained_on = tuple(state.get("feature_names", ()))  # none in those of 1.0.0
+    check_unchanged(training.features, trained_on, f"checkpoint {path}")
+    with _as_damaged(path):
         return restore(state, model)
+
+
+@contextmanager
+def _as_damaged(path: Path) -> Iterator[None]:
+    """Let whatever goes wrong say which checkpoint it is, and the way out."""
+    try:
+        yield
     except Exception as error:  # generators of random numbers take states as they please
         reason = (str(error) or type(error).__name__).splitlines()[0][:200]
         said = f"checkpoint {path} is damaged, or another run's ({reason})"
@@ -91,20 +106,22 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
 
     Raises any Exception if a part is missing, or does not fit the model.
     """
-    progress, env = read_plain(state["progress"], Progress), env_of(model)
+    progress = read_plain(state["progress"], Progress)
+    env = env_of(model)
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
     kept = [int(row["decisions"]) for row in candidates(progress.curve)]
     networks = {at: policy_of(model).acting_network() for at in kept}
     for at, network in networks.items():
         network.load_state_dict(state["candidates"][at])
-    policy, rewards = model.policy, model.get_env()
-    policy.load_state_dict(state["weights"])
-    policy.optimizer.load_state_dict(policy.optimizer.state_dict() | {"state": state["adam"]})
+    model.policy.load_state_dict(state["weights"])
+    optimizer = model.policy.optimizer
+    optimizer.load_state_dict(optimizer.state_dict() | {"state": state["adam"]})
     model.num_timesteps = num_rollouts * model.n_steps * env.num_envs
     model._n_updates = num_rollouts * model.n_epochs
     recipients = [state["recipients"][n].numpy() for n in range(len(env.batches))]
     model._last_obs = env.replay(state["seeds"], state["last_windows"], recipients)
     model._last_episode_starts = state["episode_starts"].numpy()
+    rewards = model.get_env()
     if isinstance(rewards, VecNormalize):
         for name in MOMENTS:
             setattr(rewards.ret_rms, name, state["normaliser"][name].item())

@@ -34,22 +34,25 @@ class GraphVecEnv(SwarmVecEnv):
         Raises ValueError if they cannot be shared out evenly, or a size would have no batch.
         """
         self.rng = rng
-        self.agent, self.batches = training.credit_assignment, _make_batches(training)
+        self.agent = training.credit_assignment
+        self.batches = _make_batches(training)
         self.num_nodes = max(training.robots)  # of every graph
         if self.agent == "team" and training.reward == "aoi":
             self.reward_unit = float(training.mission.num_windows)
         for n, batch in enumerate(self.batches):
             last_window = training.mission.num_windows * (n + 1) // len(self.batches)
             batch.restart(self._draw_seeds(batch), max(1, last_window))
-        sizes = [batch.shape[1] for batch in self.batches for _ in range(batch.num_missions)]
-        self._owner = np.concatenate([np.arange(size, dtype=np.int32) for size in sizes])[:, None]
+        sizes: list[int] = []  # of each mission's team
+        for batch in self.batches:
+            sizes += [batch.shape[1]] * batch.num_missions
+        owners = [np.arange(size, dtype=np.int32) for size in sizes]
+        self._owner = np.concatenate(owners)[:, None]
         self._is_robot = np.arange(self.num_nodes) < np.array(sizes)[:, None]
         seen = {name: self._space_of(rows) for name, rows in self._observe().items()}
-        action = (
-            spaces.Discrete(self.num_nodes)
-            if self.agent == "robot"
-            else spaces.MultiDiscrete([self.num_nodes] * self.num_nodes)
-        )
+        if self.agent == "robot":
+            action = spaces.Discrete(self.num_nodes)
+        else:
+            action = spaces.MultiDiscrete([self.num_nodes] * self.num_nodes)
         super().__init__(self.batches, self.agent, spaces.Dict(seen), action)
 
     @property
@@ -109,9 +112,9 @@ class GraphVecEnv(SwarmVecEnv):
     def _space_of(self, rows: np.ndarray) -> spaces.Space:
         if rows.dtype == np.bool_:
             return spaces.MultiBinary(rows.shape[1:])
-        is_number = rows.dtype == np.float32
-        low, high = (-np.inf, np.inf) if is_number else (NO_PARENT, self.num_nodes - 1)
-        return spaces.Box(low, high, rows.shape[1:], rows.dtype.type)
+        if rows.dtype == np.float32:
+            return spaces.Box(-np.inf, np.inf, rows.shape[1:], np.float32)
+        return spaces.Box(NO_PARENT, self.num_nodes - 1, rows.shape[1:], rows.dtype.type)
 
 
 def env_of(model: PPO) -> GraphVecEnv:
@@ -142,14 +145,17 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
 
 def _make_batches(training: Training) -> list[MissionBatch]:
     """Return batches that share out all missions evenly; team sizes take turns."""
-    num_missions, num_batches, sizes = training.missions, training.groups, training.robots
+    num_missions = training.missions
+    num_batches = training.groups
+    sizes = training.robots
     if num_missions % num_batches or not len(sizes) <= num_batches <= num_missions:
         raise ValueError(
             f"missions must be a multiple of their {num_batches} batches, of which each of the "
             f"{len(sizes)} team sizes needs one, not {num_missions}"
         )
-    return [
-        MissionBatch(
+    batches: list[MissionBatch] = []
+    for n in range(num_batches):
+        batch = MissionBatch(
             replace(training.mission, num_robots=sizes[n % len(sizes)]),
             num_missions // num_batches,
             features=training.features,
@@ -157,5 +163,5 @@ def _make_batches(training: Training) -> list[MissionBatch]:
             components=training.components,
             keeps_recipients=True,
         )
-        for n in range(num_batches)
-    ]
+        batches.append(batch)
+    return batches

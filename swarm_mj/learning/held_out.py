@@ -86,9 +86,12 @@ def evaluate(
 def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWindow) -> Row:
     """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
     if curve:
-        names = [selection.column(cost, n) for cost in JUDGED for n in selection.REFERENCES]
+        names: set[str] = set()
+        for cost in JUDGED:
+            names |= {selection.column(cost, name) for name in selection.REFERENCES}
         return {name: x for name, x in curve[0].items() if name in names}
-    columns, flown_by = {}, selection.reference_missions(training)
+    columns: Row = {}
+    flown_by = selection.reference_missions(training)
     flights = Flights(training=training, on_window=on_window, total=len(flown_by))
     for name, num_missions in flown_by.items():
         flown = flights.fly(partial(make_policy, name), HELD_OUT_SEED, num_missions)
@@ -104,7 +107,8 @@ def choose(
     on_window: OnWindow,
 ) -> tuple[Choice, Row]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
-    rows, run_decisions = selection.finalists(curve), int(curve[-1]["decisions"])
+    rows = selection.finalists(curve)
+    run_decisions = int(curve[-1]["decisions"])
     flights = Flights(training=training, on_window=on_window, total=len(rows) + OTHER_FLIGHTS)
     size = selection.num_missions(training, run_decisions, flights.total)
 
@@ -120,17 +124,17 @@ def choose(
     compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
-    others = {
-        name: _samples(flights.fly(policy_of, TEST_SEED, size), training.reward)
-        for name, policy_of in compared.items()
-    }
+    others: dict[str, Cost] = {}
+    for name, policy_of in compared.items():
+        samples = _samples(flights.fly(policy_of, TEST_SEED, size), training.reward)
+        others[name] = _compared(samples, own)
     choice = Choice(
         decisions=int(kept["decisions"]),
         run_decisions=run_decisions,
         num_finalists=len(rows),
         num_missions=size,
         kept=Cost(mean=_mean(own), sem=_standard_error(own)),
-        others={name: _compared(samples, own) for name, samples in others.items()},
+        others=others,
     )
     return choice, _means(training, costs)
 
@@ -173,23 +177,26 @@ def record_replay(
 
 
 def _means(training: Training, costs: Flown) -> Row:
-    age, variance = (_samples(costs, cost) for cost in JUDGED)
-    is_aged = training.reward == "aoi"
-    # Ages grow with the team; divided by its size, no size outweighs the others.
-    objective = [a / n for a, n in zip(age, training.robots, strict=True)] if is_aged else variance
+    age = _samples(costs, "aoi")
+    variance = _samples(costs, "velocity-variance")
+    if training.reward == "aoi":
+        # Ages grow with the team; divided by its size, no size outweighs the others.
+        objective = [of_size / n for of_size, n in zip(age, training.robots, strict=True)]
+    else:
+        objective = variance
     sent = sum(float(each.packets_sent.sum()) for each in costs)
     delivered = sum(float(each.packets_delivered.sum()) for each in costs)
     num_windows = training.mission.num_windows * sum(each.aoi.size for each in costs)
+    means = {"aoi": _mean(age)}
     error = _standard_error(age)
-    return {
-        "aoi": _mean(age),
-        **({} if error is None else {"aoi_sem": error}),
-        "aoi_steady": _mean([each.aoi_steady for each in costs]),
-        "velocity_variance": _mean(variance),
-        "packets_per_window": sent / num_windows,
-        "delivery_ratio": delivered / max(1.0, sent),
-        "objective": _mean(objective),
-    }
+    if error is not None:
+        means["aoi_sem"] = error
+    means["aoi_steady"] = _mean([each.aoi_steady for each in costs])
+    means["velocity_variance"] = _mean(variance)
+    means["packets_per_window"] = sent / num_windows
+    means["delivery_ratio"] = delivered / max(1.0, sent)
+    means["objective"] = _mean(objective)
+    return means
 
 
 def _samples(costs: Flown, cost: str) -> Samples:

@@ -60,7 +60,8 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
     machine lacks the device, which optimises the networks.
     """
     torch.set_num_threads(training.threads)
-    ppo, drops = training.ppo, training.drops_silence
+    ppo = training.ppo
+    drops = training.drops_silence
     env: VecEnv = GraphVecEnv(training, np.random.default_rng(training.seed))
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
@@ -101,7 +102,8 @@ def policy_of(model: PPO) -> "GnnActorCritic":
 
 def _batch_size(training: Training, num_envs: int) -> int:
     """Return the rows of a minibatch, at least 2: of one row, advantages have no spread."""
-    num_rows, num_minibatches = num_envs * training.ppo.num_steps, training.ppo.num_minibatches
+    num_rows = num_envs * training.ppo.num_steps
+    num_minibatches = training.ppo.num_minibatches
     if num_rows < 2 * num_minibatches:
         raise ValueError(
             f"a rollout of {num_rows} rows is too small for {num_minibatches} minibatches; train "
@@ -126,7 +128,8 @@ class GnnActorCritic(ActorCriticPolicy):
     """
 
     def __init__(self, *given: Any, training: Training, **others: Any) -> None:
-        self._training, self._shape = training, training.network
+        self._training = training
+        self._shape = training.network
         super().__init__(*given, **others)  # spaces and the rate's schedule come from PPO
 
     def _build(self, lr_schedule: Schedule) -> None:
@@ -141,9 +144,11 @@ class GnnActorCritic(ActorCriticPolicy):
     def acting_network(self) -> AggregationGnn:
         """Return a copy of the network that acts, without what values."""
         network = empty_network(self._shape)
-        weights = {name: t.detach().cpu().clone() for name, t in self.network.state_dict().items()}
-        for name in ("output.weight", "output.bias"):
-            weights[name] = weights[name][: self._shape.num_outputs].clone()
+        weights: dict[str, Tensor] = {}
+        for name, tensor in self.network.state_dict().items():
+            is_output = name in ("output.weight", "output.bias")
+            acts = tensor[: self._shape.num_outputs] if is_output else tensor
+            weights[name] = acts.detach().cpu().clone()
         network.load_state_dict(weights, assign=True)
         return network.requires_grad_(False)
 
@@ -158,15 +163,22 @@ class GnnActorCritic(ActorCriticPolicy):
         self, obs: dict[str, Tensor], owner: Int[Tensor, "R"], is_valued: Bool[Tensor, "R N"]
     ) -> tuple[Float[Tensor, "R N"], Float[Tensor, "R N"]]:
         """Logits over recipients, and the values of nodes that count, of every robot's graph."""
-        node, parent = obs["node"].flatten(0, -3), obs["parent"].long().flatten(0, -2)
-        may_address, has_turn = obs["may_address"].bool().flatten(0, -2), obs["has_turn"].bool()
+        node = obs["node"].flatten(0, -3)
+        parent = obs["parent"].long().flatten(0, -2)
+        may_address = obs["may_address"].bool().flatten(0, -2)
         output = self.network(node, parent, may_address)
         if self._training.shares_trunk:
-            output, values = output[:, :, :-1], output[:, :, -1]  # the last number of each node
+            values = output[:, :, -1]  # the last number of each node
+            output = output[:, :, :-1]
         else:
             values = self.value_network(node, parent, is_valued)[:, :, 0]
-        silence_logit = self._training.silence_logit
-        logits = recipient_logits(output, owner, may_address, silence_logit, has_turn.flatten())
+        logits = recipient_logits(
+            output,
+            owner=owner,
+            may_address=may_address,
+            silence_logit=self._training.silence_logit,
+            has_turn=obs["has_turn"].bool().flatten(),
+        )
         return logits, values
 
     def logits_and_value(
@@ -180,9 +192,11 @@ class GnnActorCritic(ActorCriticPolicy):
             owner = obs["owner"].long()
             logits, values = self._robots(obs, owner.squeeze(1), own[owner.squeeze(1)])
             return logits, values.gather(1, owner).squeeze(1)
-        shape, is_robot = obs["may_address"].shape[:2], obs["is_robot"].bool()
+        shape = obs["may_address"].shape[:2]
+        is_robot = obs["is_robot"].bool()
         counted = is_robot[:, :, None] & is_robot[:, None, :]
-        counted = counted if self._training.mission.preset == "reference" else counted & own
+        if self._training.mission.preset != "reference":
+            counted = counted & own
         owner = torch.arange(num_nodes, device=own.device).repeat(shape[0])
         logits, values = self._robots(obs, owner, counted.flatten(0, 1))
         value = (values.unflatten(0, shape) * counted).flatten(1).sum(1)

@@ -19,11 +19,16 @@ from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.reading import read_document, read_file, read_rows
 from swarm_mj.system.writing import write_json
 
-SETTINGS, CHECKPOINT, CURVE = "settings.json", "checkpoint.pt", "curve.csv"
-INIT, REPLAYS, TENSORBOARD = "init.safetensors", "replays", "tensorboard"
+SETTINGS = "settings.json"
+CHECKPOINT = "checkpoint.pt"
+CURVE = "curve.csv"
+INIT = "init.safetensors"
+REPLAYS = "replays"
+TENSORBOARD = "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
-MAX_BYTES, MAX_CURVE_BYTES = 1_000_000, 10_000_000  # of the settings, of the curve
+MAX_BYTES = 1_000_000  # of the settings
+MAX_CURVE_BYTES = 10_000_000
 BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
 PATIENCE = {"robot": 8, "team": 40}  # evaluations
 KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
@@ -117,9 +122,12 @@ def read_curve(path: Path) -> list[Row]:
     """Return a learning curve, a row an evaluation; raise ValueError if the file holds none."""
     rows = read_rows(path, "learning curve", MAX_CURVE_BYTES)
     try:
-        curve = [{name: float(cell) for name, cell in row.items() if cell} for _, row in rows]
-        if not all(row["decisions"] >= 0 and row["aoi"] >= 0 for row in curve):
-            raise ValueError("a cell is negative, or no number")
+        curve: list[Row] = []
+        for _, cells in rows:
+            row = {name: float(cell) for name, cell in cells.items() if cell}
+            if not (row["decisions"] >= 0 and row["aoi"] >= 0):
+                raise ValueError("a cell is negative, or no number")
+            curve.append(row)
         return curve
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} is no learning curve, of decisions and aoi: {error}") from error

@@ -123,13 +123,16 @@ class Progress:
         """Return whether the last `patience` evaluations brought no gain; never with None or 0."""
         if not patience or len(self.curve) <= patience:
             return False
-        before, since = self.curve[:-patience], self.curve[-patience:]
-        least_before, least = (min(row["objective"] for row in rows) for rows in (before, since))
+        least_before = min(row["objective"] for row in self.curve[:-patience])
+        least = min(row["objective"] for row in self.curve[-patience:])
         return least > (1.0 - MIN_GAIN) * least_before
 
     def write_curve(self, path: Path) -> None:
         """Write the learning curve; later rows may have more columns."""
-        write_csv(path, list(dict.fromkeys(name for row in self.curve for name in row)), self.curve)
+        columns: dict[str, None] = {}  # in order, each once
+        for row in self.curve:
+            columns |= dict.fromkeys(row)
+        write_csv(path, list(columns), self.curve)
 
 
 @dataclass(frozen=True, kw_only=True)

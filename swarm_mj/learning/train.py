@@ -31,14 +31,28 @@ OPTIMISER = [
 def train(
     run: TrainingRun, folder: Path, *, listener: Listener, is_resumed: bool = False
 ) -> Progress:
-    """Train until a limit, or until the listener returns False; return where the run stands.
+    """Train until a limit, or until the listener returns False.
 
-    The folder is made if it is not there. A resumed run goes on from its checkpoint, or starts over
-    if it did not get that far. The listener gets a status after every window. The policy that a run
-    begins with has the settings' network.
+    Args:
+        run: The settings, how far to go, and the policy to begin with, if any, which must have the
+            settings' network.
+        folder: Where the run keeps its files; it is made if it is not there.
+        listener: It gets a status after every window, and returns whether to go on.
+        is_resumed: Whether to go on from the folder's checkpoint. A run that did not get so far
+            starts over.
 
-    Raises ValueError if the missions cannot be made, the folder is another's, the checkpoint is
-    damaged or foreign, or training has diverged; OSError if the folder cannot be written.
+    Returns:
+        Where the run stands: its decisions, minutes and learning curve.
+
+    Raises:
+        ValueError: The missions cannot be made, the folder is another's, the checkpoint is damaged
+            or foreign, or training has diverged.
+        OSError: The folder cannot be written.
+
+    Example:
+        >>> training = usual_settings("robot", paper("stationary", num_robots=20), robots=[20])
+        >>> run = TrainingRun(training=training, limits=Limits(minutes=2.0))
+        >>> progress = train(run, Path("runs/mine"), listener=lambda status: True)
     """
     check_folder = run_folder.check_begun if is_resumed else run_folder.check_new
     check_folder(folder)
@@ -63,14 +77,18 @@ class TrainingSession(BaseCallback):
     def __init__(self, run: TrainingRun, folder: Path, listener: Listener) -> None:
         """Take a run to its last checkpoint, or else to its beginning; then it can be resumed."""
         super().__init__()
-        self._run, self._training = run, run.training
-        self._folder, self._listener = folder, listener
+        self._run = run
+        self._training = run.training
+        self._folder = folder
+        self._listener = listener
         self.ppo = make_model(run.training, run.device)
         self._env = env_of(self.ppo)
         self._aoi = math.nan
         self._goes_on = True
-        self.progress, self._networks = Progress(), checkpoint.Networks()
-        kept, own = folder / CHECKPOINT, folder / INIT
+        self.progress = Progress()
+        self._networks = checkpoint.Networks()
+        kept = folder / CHECKPOINT
+        own = folder / INIT
         init = None
         # Nothing is written before all that is read has been checked.
         if kept.exists():
@@ -96,7 +114,9 @@ class TrainingSession(BaseCallback):
 
     def learn(self) -> None:
         """Alternate rollouts and passes over them until a limit or the listener ends it (III-C)."""
-        model, progress, patience = self.ppo, self.progress, self._run.limits.patience
+        model = self.ppo
+        progress = self.progress
+        patience = self._run.limits.patience
         model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
         # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
         while True:
@@ -113,7 +133,8 @@ class TrainingSession(BaseCallback):
 
     def _is_over(self) -> bool:
         """Return whether a limit is met; of the minutes, the selection will take some."""
-        progress, limits = self.progress, self._run.limits
+        progress = self.progress
+        limits = self._run.limits
         if progress.decisions >= (limits.decisions or math.inf):
             return True
         if limits.minutes is None:
@@ -122,7 +143,8 @@ class TrainingSession(BaseCallback):
         return progress.minutes + reserved >= limits.minutes
 
     def _on_step(self) -> bool:
-        costs, progress = self._env.costs, self.progress
+        costs = self._env.costs
+        progress = self.progress
         progress.since_evaluation.add(costs)
         progress.decisions += self._env.num_teams
         self._aoi = float(np.mean([each.age_windows.mean() for each in costs]))
@@ -152,7 +174,8 @@ class TrainingSession(BaseCallback):
 
     def _between_rollouts(self, *, is_last: bool) -> None:
         """Evaluate, record a replay and keep a checkpoint, each if it is due."""
-        progress, decisions = self.progress, self.progress.decisions
+        progress = self.progress
+        decisions = progress.decisions
         # The last checkpoint was written before the rollout that broke the weights.
         if not all(torch.isfinite(weight).all() for weight in self.ppo.policy.parameters()):
             raise ValueError(
@@ -186,13 +209,16 @@ class TrainingSession(BaseCallback):
 
     def _evaluate(self) -> None:
         """Fly the held-out missions, log, and keep the policy if it is the best."""
-        progress, training = self.progress, self._training
-        decisions, network = progress.decisions, policy_of(self.ppo).acting_network()
+        progress = self.progress
+        training = self._training
+        decisions = progress.decisions
+        network = policy_of(self.ppo).acting_network()
         try:
             flies_others = partial(self._report, "Flying others")
             others = held_out.reference_columns(training, progress.curve, flies_others)
             self._count_time()
-            means, begun = progress.since_evaluation.means(), progress.minutes
+            means = progress.since_evaluation.means()
+            begun = progress.minutes
             on_window = partial(self._report, "Evaluating")
             costs = held_out.evaluate(training, network, on_window)
         except Stopped:
@@ -233,7 +259,11 @@ class TrainingSession(BaseCallback):
         """Store the policy of the evaluation after this many decisions, with its costs."""
         training = self._training
         (row,) = (each for each in self.progress.curve if each["decisions"] == decisions)
-        made = {"command": self._run.command, "decisions": decisions, "minutes": row["minutes"]}
+        made = {
+            "command": self._run.command,
+            "decisions": decisions,
+            "minutes": row["minutes"],
+        }
         config = GnnConfig(
             network=training.network,
             features=training.features,

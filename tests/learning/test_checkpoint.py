@@ -13,6 +13,7 @@ from swarm_mj.learning.checkpoint import load, save
 from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT
 from swarm_mj.learning.selection import Accumulator, Progress
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
 
 TRAINING = small_training()
 
@@ -65,6 +66,19 @@ def test_a_sound_one_is_taken_by_its_own_run_alone(kept, tmp_path):
     other = replace(TRAINING, ppo=replace(TRAINING.ppo, entropy=0.5))
     with pytest.raises(ValueError, match="made with other settings than the run's"):
         load_bytes(tmp_path, kept, other)
+
+
+def test_one_of_other_features_is_refused_by_their_names(kept, tmp_path, monkeypatch):
+    """It would go on, as if the network had learned from what it sees now."""
+    of_1_0 = changed(kept, tmp_path, without("feature_names"))
+    assert load_bytes(tmp_path, of_1_0).decisions == 32
+    names = ExtendedFeatures.names
+    monkeypatch.setattr(ExtendedFeatures, "names", (names[1], names[0], *names[2:]))
+    for content in (kept, of_1_0):
+        with pytest.raises(
+            ValueError, match=r'c\.pt was .*: number 1 of them was "is oneself" and'
+        ):
+            load_bytes(tmp_path, content)
 
 
 def test_progress_comes_back_to_the_last_bit(tmp_path):

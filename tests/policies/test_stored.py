@@ -178,7 +178,7 @@ def test_features_in_another_order_are_refused(policy, monkeypatch, is_old):
         as_of_1_0(policy)
     names = ExtendedFeatures.names
     monkeypatch.setattr(ExtendedFeatures, "names", (*names[:2], names[3], names[2], *names[4:]))
-    refused(policy, 'features: number 3 of them was "age of T" and is "distance" now; fly it with')
+    refused(policy, 'features: number 3 of them was "age of T" and is "distance" now; use it with')
 
 
 def test_one_feature_more_is_refused_by_its_name_and_not_by_a_number(policy, monkeypatch):

@@ -75,7 +75,7 @@ def check_unchanged(features: str, trained_on: Sequence[str], what: str) -> None
             has = f'"{ours}"' if ours else "nothing"
             raise ValueError(
                 f"{what} was trained on other {features} features: number {number} of them was "
-                f"{was} and is {has} now; fly it with the version that made it, or train another "
+                f"{was} and is {has} now; use it with the version that made it, or train another "
                 "with `swarm-mj train`"
             )
 
