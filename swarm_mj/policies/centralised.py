@@ -56,13 +56,17 @@ def _call_base(
 ) -> None:
     num_robots = recipient.shape[1]
     for b in range(recipient.shape[0]):
-        base, nearest_m2 = 0, np.inf
+        base = 0
+        nearest_m2 = np.inf
         for i in range(num_robots):
             x, y = position_m[b, i]
             if x * x + y * y < nearest_m2:
-                base, nearest_m2 = i, x * x + y * y
+                base = i
+                nearest_m2 = x * x + y * y
+        # Turns are those of all robots but the base, so identities from the base on move up by one.
         turn = int(now[b]) % (num_robots - 1)
-        recipient[b, turn + (turn >= base)] = base
+        caller = turn + 1 if turn >= base else turn
+        recipient[b, caller] = base
 
 
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):

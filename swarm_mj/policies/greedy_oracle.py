@@ -61,8 +61,11 @@ class GreedyOracle(CentralisedPolicy):
         """Return the window's schedule; robots move before they talk, which it does not foresee."""
         timestamp = (SLOTS_PER_WINDOW * views.buffers.timestamp).astype(np.float32)
         now = (SLOTS_PER_WINDOW * views.now).tolist()
-        links = [self._truth.links(at_m, b) for b, at_m in enumerate(states.position_m)]
-        return np.stack(list(map(greedy_window, timestamp, now, links)))
+        recipient = []
+        for b, position_m in enumerate(states.position_m):
+            links = self._truth.links(position_m, b)
+            recipient.append(greedy_window(timestamp[b], now[b], links))
+        return np.stack(recipient)
 
 
 @compiled()
@@ -80,7 +83,8 @@ def greedy_window(
         # A new pair changes the interference at all receivers, so every candidate is valued anew.
         value = window_gains(sent, gains, now, links, recipient)
         pair = np.argmax(value)
-        i, r = pair // num_robots, pair % num_robots
+        i = pair // num_robots
+        r = pair % num_robots
         if value[i, r] <= gain:
             return recipient
         gain = value[i, r]
@@ -122,7 +126,8 @@ def window_gains(
     air = air_of(links, ~is_silent)
     value = np.full((num_robots, num_robots), -np.inf)
     after = np.empty_like(sent)
-    heard, probability = np.arange(num_robots), np.zeros(num_robots)
+    heard = np.arange(num_robots)
+    probability = np.zeros(num_robots)
     for i in range(num_robots):
         if is_free[i]:
             listen(links, air, i, is_silent, heard, probability)
@@ -156,8 +161,10 @@ def _add_responses(
     answers = np.zeros(num_robots, dtype=np.bool_)  # who may decode a packet addressed to it
     for j in range(num_robots):
         answers[j] = heard[j] != j and recipient[heard[j]] == j
-    air, listens = air_of(links, answers), ~answers
-    answerer, answer_probability = np.arange(num_robots), np.zeros(num_robots)
+    air = air_of(links, answers)
+    listens = ~answers
+    answerer = np.arange(num_robots)
+    answer_probability = np.zeros(num_robots)
     has_broadcast = False
     for r in range(num_robots):
         decodes = heard[r] == i

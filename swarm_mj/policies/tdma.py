@@ -108,7 +108,8 @@ class SpatialTdma(Tdma):
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
-        self._range_m, self._threshold = mission.range_m, from_db(mission.sinr_threshold_db)
+        self._range_m = mission.range_m
+        self._threshold = from_db(mission.sinr_threshold_db)
         self._law: PowerLaw | None = None  # of mean powers [noise]
         share = math.pi * (CONTENTION_RANGES * self._range_m) ** 2 / mission.side_m**2
         self._num_expected = mission.num_robots * share  # robots in reach, oneself too
@@ -116,8 +117,10 @@ class SpatialTdma(Tdma):
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""
-        law, noise_mw = belief.law, belief.radio.noise_mw
-        self._law = None if law is None else law._replace(at_1_m=law.at_1_m / noise_mw)
+        law = belief.law
+        if law is not None:
+            law = law._replace(at_1_m=law.at_1_m / belief.radio.noise_mw)
+        self._law = law
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order, and forget powers; arguments as in `Policy.start`."""
@@ -130,17 +133,33 @@ class SpatialTdma(Tdma):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return each robot whose turn it is or that may join."""
-        buffers, slot = views.buffers, slot_of(views.now)
+        buffers = views.buffers
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         knows_all = np.all(buffers.is_known | is_oneself, axis=2)
         is_sending = knows_all.copy()
-        limits = self._range_m, self._threshold
-        keep_joined(buffers.position_m, self._order, slot, *limits, is_sending, self._powers)
+        keep_joined(
+            buffers.position_m,
+            self._order,
+            slot_of(views.now),
+            self._range_m,
+            self._threshold,
+            is_sending,
+            self._powers,
+        )
         if self._contends:
             heard = views.phases[-1].heard if views.phases else views.silence
-            seen = buffers.timestamp, buffers.position_m, heard, self._draws.next()
-            news = self._range_m, self._num_expected, self._noted_at, self._news
-            is_sending |= winners(*seen, *news) & ~knows_all
+            wins = winners(
+                timestamp=buffers.timestamp,
+                believed_m=buffers.position_m,
+                heard=heard,
+                draw=self._draws.next(),
+                range_m=self._range_m,
+                num_expected=self._num_expected,
+                noted_at=self._noted_at,
+                news=self._news,
+            )
+            is_sending |= wins & ~knows_all
+            # Whoever sends tells all that it knows, so none of that is news of its any longer.
             self._news[is_sending[:, :, None] & is_oneself] = 0.0
         return is_sending
 
@@ -178,7 +197,10 @@ def winners(
     for b in range(heard.shape[0]):
         for i in range(heard.shape[1]):
             rise = timestamp[b, i] - noted_at[b, i]
-            learned, sender, num_near, best = rise.sum() - rise[i], heard[b, i], 1, -np.inf
+            learned = rise.sum() - rise[i]  # what i learned of others
+            sender = heard[b, i]
+            num_near = 1  # robots in reach that i knows, itself too
+            best = -np.inf  # the highest priority of the others in reach
             for k in range(heard.shape[1]):
                 silence = timestamp[b, i, i] - timestamp[b, i, k]
                 has_sent = k != i and rise[k] > 0.0
@@ -192,7 +214,8 @@ def winners(
                 is_known = k != i and is_heard
                 apart_m2 = squared_distance(believed_m[b, i], i, k)
                 if is_known and apart_m2 <= (CONTENTION_RANGES * range_m) ** 2:
-                    num_near, best = num_near + 1, max(best, priority[k])
+                    num_near += 1
+                    best = max(best, priority[k])
             wins[b, i] = priority[i] > best and num_expected * draw[b, 1, i] < num_near
             noted_at[b, i] = timestamp[b, i]
     return wins

@@ -12,6 +12,10 @@ SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
 SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
 
 
+# The rule of Eq. 8 stands here, as a condition and as the rise that follows from it. The loops
+# around it are several, because each carries other arrays: `buffers.merge_newer` whole entries,
+# `merge_timestamps` T alone, `merge_expected` the mean of T, `sotdma.frame` a bit for each subject.
+# One loop for all would take the slowest one's time.
 @compiled()
 def is_newer(sent: float, held: float) -> bool:
     """Return whether a packet's entry replaces what its receiver holds: the condition of Eq. 8."""
@@ -59,6 +63,8 @@ def merge_expected(
     """Fill `merged`: the mean of T after Eq. 8, if packets decode with these probabilities."""
     for i in range(heard.shape[0]):
         share = np.float32(probability[i])
-        held, sent, row = timestamp[i], timestamp[heard[i]], merged[i]
+        held = timestamp[i]
+        sent = timestamp[heard[i]]
+        row = merged[i]
         for k in range(heard.shape[0]):
             row[k] = held[k] + share * rise(sent[k], held[k])

@@ -17,31 +17,61 @@ from swarm_mj.radio.mission_radio import mission_radio
 
 
 class Link:
-    """The channels of B missions, each from its own seed, as those of `Swarm`."""
+    """The channels of B missions, each from its own seed, as those of `Swarm`.
+
+    Args:
+        mission: Its radio, and how many robots there are.
+        seeds: One integer of 0 or more for each mission.
+
+    Raises:
+        ValueError: Without seeds, or if the mission has obstacles.
+
+    Example:
+        Robot 0 tells the two others, 100 m and 1 km away, something:
+
+        >>> link = Link(paper("stationary", num_robots=3))
+        >>> link.deliver([[0.0, 0.0], [100.0, 0.0], [1000.0, 0.0]], [True, False, False])
+        array([0, 0, 2])
+    """
 
     def __init__(self, mission: Mission, seeds: Sequence[int] = (1,)) -> None:
-        """Start all missions; raise ValueError without seeds, or if there are obstacles."""
+        """Start all missions."""
         check_seeds(seeds)
         if mission.arena != OPEN:
             raise ValueError(f"a Link has no obstacles: arena must be open, not {mission.arena}")
-        self._shape, self._now = (len(seeds), mission.num_robots), np.zeros(len(seeds))
+        self._shape = len(seeds), mission.num_robots
+        self._now = np.zeros(len(seeds))
         self._channel = mission_radio(mission).channel
         if isinstance(self._channel, Started):
             self._channel.start(mission.num_robots, streams_of(seeds).channel)
 
     def deliver(self, position_m: ArrayLike, wants_to_send: ArrayLike) -> Int[np.ndarray, "*B N"]:
-        """Return the sender that each robot decodes in the next slot, or itself: nobody.
+        """Return what the channel makes of the packets of the next slot.
 
-        Positions are [B N 2], and who sends to everyone is [B N]; there may also stand whom each
-        robot addresses, itself for silence. A single mission needs no axis B. Raises ValueError.
+        A single mission needs no axis B, neither here nor in what is returned.
+
+        Args:
+            position_m: Where the robots are, [B, N, 2] [m].
+            wants_to_send: Who sends to everyone, [B, N]; or, as integers, whom each robot
+                addresses, itself for silence and -1 for everyone.
+
+        Returns:
+            The sender that each robot decodes, [B, N], or itself: nobody.
+
+        Raises:
+            ValueError: For arrays of another shape, places that are not finite, or addressees that
+                are no robots.
         """
-        sends, place_m = np.asarray(wants_to_send), np.array(position_m, dtype=np.float64)
+        sends = np.asarray(wants_to_send)
+        place_m = np.array(position_m, dtype=np.float64)
         if sends.dtype == np.bool_:
             sends = np.where(sends, BROADCAST, np.arange(sends.shape[-1]))
         check_robots("wants_to_send", np.atleast_2d(sends), self._shape, may_broadcast=True)
-        if place_m.shape != (due := (*sends.shape, 2)) or not np.all(np.isfinite(place_m)):
+        due = (*sends.shape, 2)
+        if place_m.shape != due or not np.all(np.isfinite(place_m)):
             raise ValueError(f"position_m must be finite, of shape {due}, not {place_m.shape}")
         self._now += SLOT_WINDOWS
-        channel, recipient = channel_at(self._channel, self._now), np.atleast_2d(sends)
-        heard = channel(place_m.reshape(*self._shape, 2), recipient.astype(np.int64))
+        channel = channel_at(self._channel, self._now)
+        recipient = np.atleast_2d(sends).astype(np.int64)
+        heard = channel(place_m.reshape(*self._shape, 2), recipient)
         return heard.reshape(sends.shape)

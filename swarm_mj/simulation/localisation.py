@@ -16,19 +16,27 @@ class Localisation:
 
     It is a first-order Gauss-Markov process, sampled once a window. A robot that stands, with a
     velocity of exactly 0, knows by its odometry that it has not moved: its estimate stays.
+
+    Args:
+        mission: How large errors are [m], and how long they last [s].
+        rngs: A generator for each mission; mission b's errors come from the b-th alone.
     """
 
     def __init__(self, mission: Mission, rngs: Sequence[np.random.Generator]) -> None:
-        """Prepare errors of missions that begin, mission b's from the b-th generator alone."""
-        self._std_m, time_s = mission.position_noise_m, mission.position_noise_s
-        self._kept = math.exp(-mission.window_s / time_s) if time_s > 0.0 else 0.0
+        """Prepare the errors of missions that begin."""
+        self._std_m = mission.position_noise_m
+        self._kept = 0.0  # share of an error that is left a window later
+        if mission.position_noise_s > 0.0:
+            self._kept = math.exp(-mission.window_s / mission.position_noise_s)
         self._draws = Stream(rngs, normal, (mission.num_robots, 2))
         self._error_m: np.ndarray | None = None
 
     def observed(self, states: RobotStates) -> RobotStates:
         """Return the states with what robots observe of their own positions, a window later."""
-        error_m, before_m = self._std_m * self._draws.next(), self._error_m
+        error_m = self._std_m * self._draws.next()
+        before_m = self._error_m
         if before_m is not None:
+            # The shares' squares add up to 1, so that errors stay as large as they are.
             walked_m = self._kept * before_m + math.sqrt(1.0 - self._kept**2) * error_m
             moves = np.any(states.velocity_mps, axis=2, keepdims=True)
             error_m = np.where(moves, walked_m, before_m)

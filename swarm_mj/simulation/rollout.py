@@ -55,9 +55,22 @@ class Summary:
 def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord]:
     """Fly the missions, one window at a time, for the caller to watch, record or break off.
 
-    The policy is started; None is the one that was started already. When a window's costs are
-    yielded, the swarm stands at the end of that window. Raises as `Swarm.step` does, and ValueError
-    if the swarm has flown already.
+    Args:
+        swarm: The missions, at their start.
+        policy: It is started first; None is the one that was started already.
+
+    Yields:
+        What each window cost, when the swarm stands at the end of that window.
+
+    Raises:
+        ValueError: If the swarm has flown already; and as `Swarm.step` does.
+        TypeError: If it is no swarm; and as `Swarm.step` does.
+
+    Example:
+        >>> mission = paper("flocking")
+        >>> summary = summarise(rollout(Swarm(mission, [1]), make_policy("tdma", mission)))
+        >>> summary.aoi_mean.shape
+        (1,)
     """
     check_kind("swarm", swarm, Swarm, "Swarm(mission, [1])")
     if np.any(swarm.now > 0):
@@ -70,9 +83,16 @@ def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord
 
 
 def summarise(flown: Iterable[WindowRecord]) -> Summary:
-    """Return the costs of the windows flown, in order; `rollout` itself will do.
+    """Return the costs of missions over the windows flown.
 
-    Raises ValueError if no window was flown.
+    Args:
+        flown: The windows in order; what `rollout` yields will do.
+
+    Returns:
+        Means over the windows, and totals of packets, of every mission.
+
+    Raises:
+        ValueError: If no window was flown.
     """
     flown = list(flown)
     if not flown:

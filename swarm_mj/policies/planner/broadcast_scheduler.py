@@ -73,13 +73,22 @@ def schedule_slot(
     Slots that are not free, this one or one of those looked ahead to, are silent.
     """
     num_robots = len(timestamp)
-    branch, gain = np.empty_like(timestamp), np.empty_like(problem.lone)
-    alone, total, strongest, value, rival_mw, room_mw, probability = np.empty((7, num_robots))
-    has_news, listens = np.empty((2, num_robots), dtype=np.bool_)
-    sender, heard = np.empty((2, num_robots), dtype=np.int64)
-    air = Air(total, strongest, sender)
     search = _Search(
-        branch, alone, gain, has_news, listens, air, value, rival_mw, room_mw, heard, probability
+        branch=np.empty_like(timestamp),
+        alone=np.empty(num_robots),
+        gain=np.empty_like(problem.lone),
+        has_news=np.empty(num_robots, dtype=np.bool_),
+        listens=np.empty(num_robots, dtype=np.bool_),
+        air=Air(
+            total=np.empty(num_robots),
+            strongest=np.empty(num_robots),
+            sender=np.empty(num_robots, dtype=np.int64),
+        ),
+        value=np.empty(num_robots),
+        rival_mw=np.empty(num_robots),
+        room_mw=np.empty(num_robots),
+        heard=np.empty(num_robots, dtype=np.int64),
+        probability=np.empty(num_robots),
     )
     _schedule(timestamp, now, problem, is_free, search)
     return ~search.listens
@@ -94,26 +103,37 @@ def _schedule(
     search: _Search,
 ) -> None:
     """Choose a slot's transmitters, the first one by whose branch most is known."""
-    num_robots, alone = timestamp.shape[0], search.alone
+    num_robots = timestamp.shape[0]
+    alone = search.alone
     observe_own(timestamp, now)
     _write_gains(timestamp, problem, search)
     for i in range(num_robots):
         alone[i] = 0.0
         for j in range(num_robots):
             alone[i] += search.gain[i, j] * problem.lone[i, j]
-    best, most_known = NOBODY, -np.inf
-    for _ in range(problem.width if problem.width > 1 and is_free[0] else 0):
+    best = NOBODY
+    most_known = -np.inf
+    num_tried = 0
+    if problem.width > 1 and is_free[0]:
+        num_tried = problem.width
+    for _ in range(num_tried):
         first = int(np.argmax(alone))
         if alone[first] <= 0.0:
             break
         alone[first] = 0.0
-        for i in range(num_robots):
-            for k in range(num_robots):
-                search.branch[i, k] = timestamp[i, k]
+        _copy(timestamp, search.branch)
         known = _follow(search.branch, now, problem, first, is_free, search)
         if known > most_known:
-            best, most_known = first, known
+            best = first
+            most_known = known
     _follow(timestamp, now, problem, best, is_free[:1], search)
+
+
+@compiled(makes_arrays=False)
+def _copy(timestamp: Float32[np.ndarray, "N N"], branch: Float32[np.ndarray, "N N"]) -> None:
+    for i in range(timestamp.shape[0]):
+        for k in range(timestamp.shape[1]):
+            branch[i, k] = timestamp[i, k]
 
 
 @compiled(makes_arrays=False)
@@ -135,6 +155,7 @@ def _follow(
         for i in range(timestamp.shape[0]):
             search.listens[i] = True
         if is_free[p]:
+            # The first transmitter is given of the first slot only; later ones are chosen freely.
             _choose(timestamp, problem, first if p == 0 else NOBODY, search)
         total = np.float32(0.0)
         for i in range(timestamp.shape[0]):
@@ -149,7 +170,9 @@ def _choose(
     timestamp: Float32[np.ndarray, "N N"], problem: Problem, first: int, search: _Search
 ) -> None:
     """Choose a slot's transmitters, a given first one among them, and bring T to its end."""
-    links, air, listens = problem.links, search.air, search.listens
+    links = problem.links
+    air = search.air
+    listens = search.listens
     _write_gains(timestamp, problem, search)
     _sum_air(links, search)
     best, value = _best_addition(problem, search, first, 0.0)
@@ -169,7 +192,9 @@ def _sum_air(links: Links, search: _Search) -> None:
     """Add up all packets in the air, in the order of their senders."""
     air = search.air
     for j in range(search.listens.shape[0]):
-        air.total[j], air.strongest[j], air.sender[j] = 0.0, 0.0, j
+        air.total[j] = 0.0
+        air.strongest[j] = 0.0
+        air.sender[j] = j
     for i in range(search.listens.shape[0]):
         if not search.listens[i]:
             broadcast(links, air, i)
@@ -182,21 +207,28 @@ def _best_addition(problem: Problem, search: _Search, only: int, least: float) -
     That is `NOBODY` where no value is above the least. Of robots that are as good, it is the first.
     If it is said who may, nobody else is tried.
     """
-    links, num_robots = problem.links, search.listens.shape[0]
+    links = problem.links
+    num_robots = search.listens.shape[0]
+    # What each receiver is worth now, and how much more power would change that: by these bounds
+    # most candidates are ruled out, so their packets need not be added up at every receiver.
     for j in range(num_robots):
-        search.value[j], search.rival_mw[j], search.room_mw[j] = 0.0, np.inf, np.inf
+        search.value[j] = 0.0
+        search.rival_mw[j] = np.inf
+        search.room_mw[j] = np.inf
         if search.listens[j]:
             search.value[j] = max(_value_at(links, search, j, j), 0.0)
             search.rival_mw[j] = search.air.strongest[j]
             search.room_mw[j] = room_for_interference(links, incoming_at(search.air, j), j)
-    best, best_value = NOBODY, least
+    best = NOBODY
+    best_value = least
     for i in range(num_robots):
         if search.listens[i] and search.has_news[i] and only in (NOBODY, i):
             with_i = _bound(problem, search, i)
             if with_i > best_value:
                 with_i = _value_with(links, search, i)
             if with_i > best_value:
-                best, best_value = i, with_i
+                best = i
+                best_value = with_i
     return best, best_value
 
 
@@ -206,7 +238,8 @@ def _bound(problem: Problem, search: _Search, i: int) -> float:
 
     No packet decodes more probably than in silence, or than before.
     """
-    links, total = problem.links, 0.0
+    links = problem.links
+    total = 0.0
     for j in range(search.listens.shape[0]):
         if links.received_mw[i, j] > search.rival_mw[j]:
             total += max(search.gain[i, j] * problem.lone[i, j], 0.0)
@@ -238,7 +271,8 @@ def _value_at(links: Links, search: _Search, also: int, j: int) -> float:
 @compiled(makes_arrays=False)
 def _write_gains(timestamp: Float32[np.ndarray, "N N"], problem: Problem, search: _Search) -> None:
     """Fill in the value of j decoding i, where it can, and which robots have news for anyone."""
-    gain, has_news = search.gain, search.has_news
+    gain = search.gain
+    has_news = search.has_news
     for i in range(timestamp.shape[0]):
         has_news[i] = False
         for j in range(timestamp.shape[0]):

@@ -27,7 +27,8 @@ class Discovery:
         range_m: float,
     ) -> None:
         """Draw the orders of a mission whose area is as large as this many circles of the range."""
-        self._range_m, self._settings = range_m, settings
+        self._range_m = range_m
+        self._settings = settings
         self._order = rng.permutation(num_robots)
         self._place = np.argsort(self._order)
         at_once = round(settings.transmitters_per_reach * num_reaches)
@@ -37,8 +38,10 @@ class Discovery:
         self._groups = []  # of robots that transmit at the same time
         for n in range(settings.num_orders):
             order = rng.permutation(num_robots)
-            size = min(at_once if n < settings.num_fast_rounds else later, num_robots - 1)
-            self._groups += [order[first : first + size] for first in range(0, num_robots, size)]
+            size = at_once if n < settings.num_fast_rounds else later
+            size = min(size, num_robots - 1)  # someone has to listen
+            for first in range(0, num_robots, size):
+                self._groups.append(order[first : first + size])
         windows = min(settings.search_rounds * num_robots, settings.latest_search_windows)
         self._search_slot = SLOTS_PER_WINDOW * windows
 

@@ -11,6 +11,7 @@ link's excess follows by Bayes' rule. Packets carry what robots observed, and tw
 that the sender plans by, and the best of the next.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache, cached_property
@@ -34,6 +35,7 @@ BIN_CENTRES_DB = LEAST_MARGIN_DB + BIN_DB * np.arange(NUM_BINS)
 
 NOTHING = -1  # in place of the kind of a packet
 MISSED, DECODED = range(2)  # outcomes of a packet
+NUM_OUTCOMES = 2
 MAX_KINDS = 64  # that one robot notes
 MAX_TIMES = 255  # that it notes one kind
 
@@ -73,9 +75,11 @@ def observe(
     links before anything was learned.
     """
     num_robots = len(heard)
-    everyone, is_other = np.arange(num_robots), ~np.eye(num_robots, dtype=bool)
+    everyone = np.arange(num_robots)
+    is_other = ~np.eye(num_robots, dtype=bool)
     arriving_mw = np.where(transmitted[:, None] & is_other, believed_mw, 0.0)
     is_decoded = heard != everyone
+    # Whose packet it was: of one that was missed, the strongest that should have arrived.
     i = np.where(is_decoded, heard, np.argmax(arriving_mw, axis=0))
     # A sum of its own: the packet that j decoded need not be the strongest by this belief.
     others_mw = np.sum(np.where(everyone[:, None] == i, 0.0, arriving_mw), axis=0)
@@ -83,11 +87,21 @@ def observe(
     margin_db = to_db(np.maximum(margin, np.finfo(np.float64).tiny))
     place = np.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5).astype(np.int64)
     is_missed = np.any(arriving_mw > 0.0, axis=0) & (place >= 0)
-    kind = (is_decoded * num_robots + i) * NUM_BINS + np.clip(place, 0, NUM_BINS - 1)
+    outcome = np.where(is_decoded, DECODED, MISSED)
+    bins = np.clip(place, 0, NUM_BINS - 1)
+    kind = np.ravel_multi_index((outcome, i, bins), _kinds(num_robots))
     # Where the error of positions may well have decided, a packet teaches nothing of the channel.
     doubt_db = DOUBTFUL_STDS * 2.0 * DB_PER_NEPER / prior.distance_over_std[i, everyone]
     is_telling = (is_decoded | is_missed) & (np.abs(margin_db) >= doubt_db)
     return np.where(listens & is_telling, kind, NOTHING)
+
+
+def _kinds(num_robots: int) -> tuple[int, int, int]:
+    """Return the shape of an array by kinds of packets: by outcome, sender and bin of the margin.
+
+    A kind is a place in such an array, counted on row by row.
+    """
+    return NUM_OUTCOMES, num_robots, NUM_BINS
 
 
 class Evidence:
@@ -95,7 +109,8 @@ class Evidence:
 
     def __init__(self, num_robots: int) -> None:
         self._slots: list[Int[np.ndarray, " N"]] = []  # the kind that j noted in each
-        self._times = np.zeros((num_robots, 2 * num_robots * NUM_BINS), dtype=np.int64)
+        # How often j noted each kind.
+        self._times = np.zeros((num_robots, math.prod(_kinds(num_robots))), dtype=np.int64)
 
     def add(self, kinds: Int[np.ndarray, "N"]) -> None:
         """Note the next slot; robots whose notes are full count on only the kinds they have."""
@@ -114,7 +129,7 @@ class Evidence:
         slot, j = np.nonzero((kinds != NOTHING) & (np.arange(len(kinds))[:, None] <= known_until))
         times = np.zeros_like(self._times)
         np.add.at(times, (j, kinds[slot, j]), 1)
-        by_outcome = times.reshape(num_robots, 2, num_robots, NUM_BINS)
+        by_outcome = times.reshape(num_robots, *_kinds(num_robots))
         return by_outcome[:, DECODED], by_outcome[:, MISSED]
 
 
@@ -175,10 +190,15 @@ def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable
     weight /= weight.sum(axis=1, keepdims=True)
     mean_db = weight @ EXCESS_DB
     std_db = np.sqrt(np.maximum(weight @ EXCESS_DB**2 - mean_db**2, 0.0))
-    table = np.zeros((2, num_robots, num_robots))
-    rounded_db = STEP_DB * np.rint(np.stack([mean_db, std_db]) / STEP_DB)
-    table[:, one, other] = table[:, other, one] = rounded_db
-    return LinkTable(law=law, mean_db=table[0], std_db=table[1])
+
+    def rounded(of_links: Float[np.ndarray, "L"]) -> Float[np.ndarray, "N N"]:
+        """Return a number of each link by its two robots, in either order [dB]."""
+        table = np.zeros((num_robots, num_robots))
+        table[one, other] = STEP_DB * np.rint(of_links / STEP_DB)
+        table[other, one] = table[one, other]
+        return table
+
+    return LinkTable(law=law, mean_db=rounded(mean_db), std_db=rounded(std_db))
 
 
 def corrected(links: Links, table: LinkTable, settings: PlannerSettings) -> Links:
@@ -198,12 +218,16 @@ def corrected(links: Links, table: LinkTable, settings: PlannerSettings) -> Link
 
 def _best(explained: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int, int]:
     """Return the most probable law and prior, at a price for each step from the believed ones."""
-    steps = (np.arange(len(LAWS)) > 0).astype(np.float64)
-    steps += [law.rician_k != NO_FADING for law in LAWS]
+    steps = np.zeros(len(LAWS))
+    for f, law in enumerate(LAWS):
+        if f > 0:  # the first law is the believed one
+            steps[f] += 1.0
+        if law.rician_k != NO_FADING:
+            steps[f] += 1.0
     log_odds = explained - min_log_odds * steps[:, None]
-    log_odds[:, 1:] -= min_log_odds
-    law, prior = np.unravel_index(np.argmax(log_odds), log_odds.shape)
-    return int(law), int(prior)
+    log_odds[:, 1:] -= min_log_odds  # the first prior is the believed one
+    best_law, best_prior = np.unravel_index(np.argmax(log_odds), log_odds.shape)
+    return int(best_law), int(best_prior)
 
 
 @cache
@@ -225,10 +249,15 @@ def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, 
 
 def _decodes(margin_db: Float[np.ndarray, "K X"]) -> Float[np.ndarray, "K F X"]:
     """Return how probably a packet decodes, by each law."""
-    ratios, laws = from_db(margin_db).tolist(), range(len(LAWS))
-    return np.array(
-        [[[probability_at(_curves(f), 0, x) for x in row] for f in laws] for row in ratios]
-    )
+    num_bins, num_excesses = margin_db.shape
+    ratio = from_db(margin_db)
+    probability = np.empty((num_bins, len(LAWS), num_excesses))
+    for f in range(len(LAWS)):
+        curves = _curves(f)
+        for k in range(num_bins):
+            for x in range(num_excesses):
+                probability[k, f, x] = probability_at(curves, 0, float(ratio[k, x]))
+    return probability
 
 
 @cache
@@ -237,8 +266,10 @@ def _priors() -> Float[np.ndarray, "P X"]:
     is_expected = (EXCESS_DB == 0.0).astype(np.float64)
     is_blocked = (EXCESS_DB < BLOCKED_BELOW_DB).astype(np.float64)
     normal = [np.exp(-0.5 * (EXCESS_DB / spread_db) ** 2) for spread_db in SPREADS_DB]
-    num = is_blocked.sum()
-    blocked = [(1.0 - x) * is_expected + x * is_blocked / num for x in BLOCKED_SHARES]
+    num_blocked = is_blocked.sum()
+    blocked = [
+        (1.0 - share) * is_expected + share * is_blocked / num_blocked for share in BLOCKED_SHARES
+    ]
     priors = np.stack([is_expected, *normal, *blocked])
     return priors / priors.sum(axis=1, keepdims=True)
 

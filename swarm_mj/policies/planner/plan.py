@@ -44,11 +44,14 @@ class Plan:
         It looks as far ahead as on certain links if that is said, or else if its links are. Links
         may be others from some slots on, every `settings.drawn_slots`.
         """
-        is_certain = not links.is_doubtful if is_certain is None else is_certain
-        timestamp = np.full_like(links.received_mw, NEVER) if timestamp is None else timestamp
+        if is_certain is None:
+            is_certain = not links.is_doubtful
+        if timestamp is None:
+            timestamp = np.full_like(links.received_mw, NEVER)
         self._problem_of = partial(problem_of, settings=settings, is_certain=is_certain)
         self._problem = self._problem_of(links)
-        self._links_from, self._drawn_slots = links_from, settings.drawn_slots
+        self._links_from = links_from
+        self._drawn_slots = settings.drawn_slots
         self._timestamp = (SLOTS_PER_WINDOW * timestamp).astype(np.float32)  # [slots]
         self._now = SLOTS_PER_WINDOW * now
         self._is_free = is_free
@@ -87,7 +90,8 @@ def epoch_plan(
     is_free: Bool[np.ndarray, "P"],
 ) -> Plan:
     """Return the plan of an epoch that begins with T and t [windows], by one robot's snapshot."""
-    is_fresh, observed = snapshots.is_fresh[owner], snapshots.timestamp[owner]
+    is_fresh = snapshots.is_fresh[owner]
+    observed = snapshots.timestamp[owner]
     round_windows = max(len(observed), settings.min_round_windows)
     is_gone = now - observed > settings.gone_rounds * round_windows
     is_there = snapshots.is_known[owner] & (is_fresh | ~is_gone)
@@ -112,14 +116,16 @@ def problem_of(links: Links, settings: PlannerSettings, *, is_certain: bool) -> 
     receivers that many robots lie behind, for a receiver that passes news on to many others should
     get it early. On certain links looking further ahead pays.
     """
-    lone, num_robots = lone_probabilities(links), len(links.received_mw)
+    lone = lone_probabilities(links)
+    num_robots = len(links.received_mw)
     hops = expected_hops(np.where(lone >= settings.min_probability, lone, 0.0))
     behind = np.maximum(num_downstream(hops, settings.slack_hops), 1.0)
     weight = behind**settings.downstream_exponent
     weight *= np.clip(hops, 1.0, num_robots) ** settings.hops_exponent
     width, depth = settings.rest_lookahead if is_certain else settings.moving_lookahead
     if num_robots > settings.max_lookahead_robots:
-        width, depth = 1, 1
+        width = 1
+        depth = 1
     return Problem(
         links=links,
         lone=lone,
@@ -137,13 +143,15 @@ def _min_share(links: Links, lone: Float[np.ndarray, "N N"], settings: PlannerSe
     positions are doubtful or a robot has no link, plans should not rely on every packet.
     """
     has_link = np.any(lone >= settings.min_probability, axis=1)
-    total, num_linked = float(np.sum(lone)), int(np.sum(has_link))
+    total = float(np.sum(lone))
+    num_linked = int(np.sum(has_link))
     share = settings.share_unlinked
     if not links.is_doubtful:
         share += settings.share_per_link * total / max(1, num_linked * (num_linked - 1))
     doubt = np.sum(lone / links.distance_over_std) / max(total, settings.min_probability)
     share += settings.share_per_std * float(doubt)
-    share += 0.0 if np.all(has_link) else settings.share_isolated
+    if not np.all(has_link):
+        share += settings.share_isolated
     return min(share, settings.max_share)
 
 

@@ -53,8 +53,10 @@ def take_snapshots(
     They are taken for the middle of an epoch some windows ahead. The best has most robots fresh,
     then the least mean age of these, then the lowest identity.
     """
-    is_known, velocity_mps = view.is_known, view.velocity_mps
-    num_robots, num_known = len(is_known), np.sum(is_known, axis=1)
+    is_known = view.is_known
+    velocity_mps = view.velocity_mps
+    num_robots = len(is_known)
+    num_known = np.sum(is_known, axis=1)
     age = np.where(is_known, view.now - view.timestamp, 0.0)
     ahead = age + windows_ahead
     mean_mps = np.sum(velocity_mps * is_known[..., None], axis=1) / num_known[:, None]
@@ -67,14 +69,18 @@ def take_snapshots(
     # A team at rest of which many are stale has lost nobody: its robots fly plans that differ.
     rests = np.all(is_known, axis=1) & ~np.any(position_std_m, axis=1)
     is_divided = rests & (num_fresh < settings.min_fresh_share * num_robots)
+    # Robots are not expected to keep their velocities for longer than that.
     steady = np.minimum(ahead, settings.steady_windows)
+    # `lexsort` sorts by its last key first.
+    mean_age = np.sum(age * is_fresh, axis=1) / num_fresh
+    best_first = np.lexsort((mean_age, -num_fresh))
     return Snapshots(
         is_known=is_known,
         is_fresh=is_fresh | is_divided[:, None],
         position_m=view.position_m + velocity_mps * steady[..., None] * window_s,
         position_std_m=position_std_m,
         timestamp=view.timestamp.copy(),
-        rank=np.argsort(np.lexsort((np.sum(age * is_fresh, axis=1) / num_fresh, -num_fresh))),
+        rank=np.argsort(best_first),
         held=np.arange(num_robots),
     )
 

@@ -81,10 +81,15 @@ def empty_frame(power: Float[np.ndarray, "N N"], rule: Rule) -> Frame:
 @compiled()
 def switch(frame: Frame, s: int, k: int) -> None:
     """Let k transmit in a slot, or no longer, and write what sender each decodes (Eqs. 3-4)."""
-    num_robots, rule, air = frame.slot.shape[0], frame.rule, silent_air(frame.slot.shape[0])
+    num_robots = frame.slot.shape[0]
+    rule = frame.rule
+    air = silent_air(num_robots)
     frame.slot[k] = NOWHERE if frame.slot[k] == s else s
     for i in range(num_robots):
-        for j in range(num_robots if frame.slot[i] == s else 0):
+        if frame.slot[i] != s:
+            continue
+        for j in range(num_robots):
+            # A robot that transmits in the slot decodes nothing.
             signal = 0.0 if frame.slot[j] == s else frame.power[i, j]
             add_to_air(air, i, j, signal, frame.power[i, j])
     for j in range(num_robots):
@@ -134,15 +139,26 @@ def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.
     slot knows a later frame's in the same slot of the last one. So what it knows in a slot makes T
     a frame younger in the last frame, and in that frame itself younger than the start.
     """
-    (num_slots, num_robots), num_columns = tried.shape, known.shape[1]
-    last, news = (frame.rule.simulated_frames - 1) * num_slots, np.empty(num_columns, np.uint64)
-    each, gained = ~np.zeros((1, num_columns), np.uint64), np.zeros(num_columns, np.int64)
+    num_slots, num_robots = tried.shape
+    num_columns = known.shape[1]
+    last = (frame.rule.simulated_frames - 1) * num_slots  # the first slot of the last frame
+    news = np.empty(num_columns, np.uint64)
+    each = ~np.zeros((1, num_columns), np.uint64)
+    gained = np.zeros(num_columns, np.int64)
     for n in range(last + num_slots):
         s = n % num_slots
-        value, times = (each, num_slots * (last - n)) if n < last else (younger, last - n)
+        # Before the last frame, news makes all of that frame younger, whoever it is of. Within it,
+        # the slots that have passed are taken off what is added for the whole frame in the end.
+        if n < last:
+            value = each
+            times = num_slots * (last - n)
+        else:
+            value = younger
+            times = last - n
         for i in range(num_robots):
             # In place: a robot that transmits decodes nothing, so its row is as it was sent.
-            j, k = frame.heard[s, i], tried[s, i]
+            j = frame.heard[s, i]
+            k = tried[s, i]
             if (j != i or k != i) and _learn(known[i], known[j], known[k], s, num_slots, news):
                 _weigh(news, value, times, gained)
     for i in range(num_robots):
@@ -153,13 +169,18 @@ def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.
 @compiled()
 def mean_ages(frame: Frame, tried: Heard, own: int) -> Float[np.ndarray, "F"]:
     """Return the mean age in the last frame if `own` is heard as `tried` in each slot [slots]."""
-    (num_slots, num_robots), start = tried.shape, int(frame.rule.start_frames * tried.shape[0])
+    num_slots, num_robots = tried.shape
+    start = int(frame.rule.start_frames * num_slots)
     num_columns = -(-num_robots // WORD) * num_slots
-    known, rest = np.zeros((num_robots, num_columns), np.uint64), np.zeros(num_slots)
+    known = np.zeros((num_robots, num_columns), np.uint64)
+    rest = np.zeros(num_slots)
     younger = np.zeros((int(math.log2(start + num_slots)) + 1, num_columns), np.uint64)
     for i in range(num_robots):
-        for t in range(num_slots if i == own or frame.slot[i] != NOWHERE else 0):
-            c, bit = i // WORD * num_slots + t, np.uint64(i % WORD)
+        if i != own and frame.slot[i] == NOWHERE:
+            continue
+        for t in range(num_slots):
+            c = i // WORD * num_slots + t
+            bit = np.uint64(i % WORD)
             by = (t if i == own else frame.slot[i]) + 1 + start
             known[i, c] = np.uint64(1) << bit
             rest[t] += num_slots * by  # of oneself, who is of now anyway
@@ -174,15 +195,17 @@ def mean_ages(frame: Frame, tried: Heard, own: int) -> Float[np.ndarray, "F"]:
 @compiled()
 def _rounded_age(frame: Frame, tried: Heard, trial: int) -> float:
     """Return the mean age of a trial as `mean_ages` does, but summed up robot by robot."""
-    (num_slots, num_robots), total = tried.shape, 0.0
+    num_slots, num_robots = tried.shape
+    total = 0.0
     last = (frame.rule.simulated_frames - 1) * num_slots
     timestamp = np.full((num_robots, num_robots), -float(int(frame.rule.start_frames * num_slots)))
     for n in range(last + num_slots):
         s = n % num_slots
         observe_own(timestamp, n + 1.0)
         merge_timestamps(timestamp, tried[s] if s == trial else frame.heard[s], timestamp)
-        for i in range(num_robots if n >= last else 0):
-            total += n + 1 - np.sum(timestamp[i]) / num_robots
+        if n >= last:
+            for i in range(num_robots):
+                total += n + 1 - np.sum(timestamp[i]) / num_robots
     return total / (num_slots * num_robots)
 
 
@@ -205,9 +228,12 @@ def best_slot(frame: Frame, k: int, own: int, min_gain: float, is_marked: Marks)
     ages[own] -= min_gain
     is_best = ages <= np.min(ages) + TIE
     # Between equals, rounding decides: that of the sum over all robots, one after the other.
-    for s in range(ages.shape[0] if np.sum(is_best) > 1 else 0):
-        if is_best[s]:
-            ages[s] = _rounded_age(frame, tried, s) - (min_gain if s == own else 0.0)
+    if np.sum(is_best) > 1:
+        for s in range(ages.shape[0]):
+            if is_best[s]:
+                ages[s] = _rounded_age(frame, tried, s)
+                if s == own:
+                    ages[s] -= min_gain
     return int(np.argmin(ages))
 
 
@@ -252,7 +278,8 @@ def chosen(
     Robots that chose lately, before this slot of the mission, and did not announce one since may
     have moved: i first predicts their choices.
     """
-    num_robots, slots = slots.shape[0], slots.copy()
+    num_robots = slots.shape[0]
+    slots = slots.copy()
     frame = empty_frame(power, rule)
     for k in range(num_robots):
         if is_known[k] or k == i:

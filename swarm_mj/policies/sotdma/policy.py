@@ -75,7 +75,8 @@ class SelfOrganisedTdma(BroadcastPolicy):
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
-        self._turns, self._belief = SpatialTdma(mission), Belief(radio=radio_of(mission))
+        self._turns = SpatialTdma(mission)
+        self._belief = Belief(radio=radio_of(mission))
         # Packets say whom their senders heard only if they hold all of T and P as before the slot.
         # By the authors' rule a robot may decode while it transmits, which changes its T in it.
         is_whole = fits(packet_of(mission), mission)
@@ -113,7 +114,8 @@ class SotdmaTeam:
         self, order: Int[np.ndarray, "N"], belief: Belief, *, reads_packets: bool = True
     ) -> None:
         """Prepare the team, whose robots choose in this order."""
-        self._order, self._reads_packets = order, reads_packets
+        self._order = order
+        self._reads_packets = reads_packets
         self._law = belief.law_over_noise(len(order))
         self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
         self._first_slot: int | None = None  # of the first frame, known from the first decision on
@@ -126,7 +128,9 @@ class SotdmaTeam:
 
         Before the first frame these are the robots in turn; `draw` is on [0, 1), for contention.
         """
-        rule, order, slot = self._rule, self._order, round(view.now / SLOT_WINDOWS)
+        rule = self._rule
+        order = self._order
+        slot = round(view.now / SLOT_WINDOWS)
         if self._first_slot is None:
             self._first_slot = slot + rule.first_rounds * len(order)
         slot -= self._first_slot
@@ -138,16 +142,27 @@ class SotdmaTeam:
             self.table = slot_table.empty_table(slots, rule.num_slots)
         # A robot observes itself as it transmits, so T says in which slot it last did.
         ends = np.rint(SLOTS_PER_WINDOW * view.timestamp).astype(np.int64)
-        table, known = self.table, ends - 1 - self._first_slot
+        known = ends - 1 - self._first_slot
+        table = self.table
         if self._reads_packets:
             slot_table.read_packets(table, view.heard, known, view.parent, slot - 1, rule)
         slot_table.read_slots(table, known, rule)
-        first, after = (choices_before(slot + n, len(order), rule) for n in (0, 1))
-        for i in order[np.arange(first, after) % len(order)].tolist():
-            slots, announced = table.slots[i], table.announced[i]
-            is_marked = slot_table.marks(table, i, slot, rule)
-            power = self._powers(view.position_m[i], is_known[i])
-            slots[i] = chosen(i, slots, announced, is_known[i], is_marked, order, slot, power, rule)
+        # Robots whose turns to choose come in this slot: mostly one, or none.
+        first = choices_before(slot, len(order), rule)
+        after = choices_before(slot + 1, len(order), rule)
+        for turn in range(first, after):
+            i = int(order[turn % len(order)])
+            table.slots[i, i] = chosen(
+                i=i,
+                slots=table.slots[i],
+                announced=table.announced[i],
+                is_known=is_known[i],
+                is_marked=slot_table.marks(table, i, slot, rule),
+                order=order,
+                slot=slot,
+                power=self._powers(view.position_m[i], is_known[i]),
+                rule=rule,
+            )
         place = place_of(slot, rule)
         if place == NO_PLACE:
             is_near = is_known & _is_in_range(view.position_m, self._law, rule.threshold)

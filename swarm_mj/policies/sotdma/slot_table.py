@@ -39,7 +39,8 @@ class SlotTable(NamedTuple):
 
 def empty_table(slots: Int[np.ndarray, "N N"], num_slots: int) -> SlotTable:
     """Return the memory of robots that believe in these slots and remember nothing else."""
-    num_robots, pairs = len(slots), slots.shape
+    num_robots = len(slots)
+    pairs = slots.shape
     return SlotTable(
         slots=slots,
         announced=np.full(pairs, LONG_AGO),
@@ -70,7 +71,8 @@ def read_slots(table: SlotTable, known: Int[np.ndarray, "N N"], rule: Rule) -> N
             if k != i and known[i, k] >= 0 and known[i, k] > table.announced[i, k]:
                 place = place_of(known[i, k], rule)
                 if place != NO_PLACE:
-                    table.announced[i, k], table.slots[i, k] = known[i, k], place
+                    table.announced[i, k] = known[i, k]
+                    table.slots[i, k] = place
 
 
 @compiled()
@@ -90,7 +92,8 @@ def read_packets(
         j = heard[i]
         if j == i:
             continue
-        table.decoded[i, j], table.got_through[i, j] = slot, known[j, i]
+        table.decoded[i, j] = slot
+        table.got_through[i, j] = known[j, i]
         sent = table.sent[i]
         place = place_of(sent, rule)
         # A packet counts once per neighbour, however often that one repeats what it knows.
@@ -131,9 +134,11 @@ def are_in_need(
 
     A neighbour that is silent for too long is gone.
     """
-    patience, resignation = rule.num_slots * np.array([rule.need_frames, rule.lost_frames])
+    patience = rule.num_slots * rule.need_frames
+    resignation = rule.num_slots * rule.lost_frames
     silent = slot - known
     is_lost = (patience < silent) & (silent <= resignation)
     is_lost_to = table.decoded - table.got_through > patience
+    # An older packet says nothing of now: its sender may have heard from the robot since.
     is_lost_to &= table.decoded > slot - patience
     return np.any(is_near & (is_lost | is_lost_to), axis=1)

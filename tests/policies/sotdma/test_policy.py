@@ -170,7 +170,7 @@ def test_robots_choose_in_common_order_from_the_second_frame_on(monkeypatch):
     team, chose = begun(row()), []
     assert team._rule.num_slots == 11
     monkeypatch.setattr(
-        sotdma_policy, "chosen", lambda i, slots, *_: chose.append((n, i)) or slots[i]
+        sotdma_policy, "chosen", lambda i, slots, **_: chose.append((n, i)) or slots[i]
     )
     for n in range(1, 88):
         asked(team, row(), FIRST + n)

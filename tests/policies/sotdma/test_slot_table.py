@@ -126,3 +126,15 @@ def test_a_robot_is_in_need_that_lost_a_neighbour_or_is_lost_to_one():
     assert needs(38)
     table.got_through[0, 1] = 32
     assert not needs(38)
+
+
+def test_what_was_decoded_too_long_ago_shows_no_need_any_more():
+    """At slot 40 with a patience of 6 slots: a packet of slot 35 counts, and one of 34 does not,
+    though both knew of nothing that the robot sent in the 7 slots before."""
+    table, everyone = memory(), np.ones((3, 3), dtype=bool)
+    rule = Rule(threshold=1.0, num_slots=3, need_frames=2.0, lost_frames=4.0)
+    known = np.full((3, 3), 39)
+    for decoded, expected in ((35, True), (34, False)):
+        table.decoded[0, 1] = decoded
+        table.got_through[0, 1] = decoded - 7
+        assert are_in_need(table, known, everyone, 40, rule).tolist() == [expected, False, False]
