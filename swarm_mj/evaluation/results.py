@@ -13,7 +13,7 @@ import msgspec
 import numpy as np
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.measured import HOW, Measured, column, later_column
+from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_column
 from swarm_mj.mission.specification import NOTHING, OPEN, Mission
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE
 from swarm_mj.radio.words import radio_in_words
@@ -169,7 +169,7 @@ class Result:
     config: str = column(lambda own: own.config)
 
 
-def computation(spec: Field[Any]) -> Callable[[Measured], object]:
+def computation(spec: Field[Any]) -> Callable[[Measurements], object]:
     """Return how a column is computed; raise TypeError for one that nothing computes."""
     if HOW not in spec.metadata:
         raise TypeError(
@@ -184,7 +184,7 @@ COMPUTATIONS = {spec.name: computation(spec) for spec in fields(Result)}
 COLUMNS = tuple(COMPUTATIONS)
 
 
-def result_of(measured: Measured) -> Result:
+def result_of(measured: Measurements) -> Result:
     """Return all columns of what was measured."""
     cells: dict[str, Any] = {name: compute(measured) for name, compute in COMPUTATIONS.items()}
     for name, value in cells.items():

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.measured import Measured
+from swarm_mj.evaluation.measurements import Measurements
 from swarm_mj.evaluation.results import Evaluated, result_of, write_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
@@ -34,7 +34,7 @@ def study_results(
     evaluated: list[Evaluated] = []
     for (regime, policy), own in merged.items():
         baseline = flown_name(study.compared_to, regime)
-        measured = Measured(
+        measured = Measurements(
             study=study,
             mission=regime,
             policy=policy,

@@ -7,7 +7,7 @@ from typing import get_args
 
 import pytest
 
-from swarm_mj.evaluation.measured import column, later_column
+from swarm_mj.evaluation.measurements import column, later_column
 from swarm_mj.evaluation.results import (
     BRIEF,
     COLUMNS,

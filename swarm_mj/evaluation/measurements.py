@@ -24,7 +24,7 @@ HOW = "how a column is computed"  # its place among the metadata of a field
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Measured:
+class Measurements:
     """A policy's missions in a regime, and the baseline's, which are the same missions."""
 
     study: Study
@@ -186,13 +186,13 @@ class Measured:
         return published(self.policy, self.mission)
 
 
-def column(value: Callable[[Measured], T]) -> T:
+def column(value: Callable[[Measurements], T]) -> T:
     """Return a field of `Result`: a column that every file has, and how it is computed."""
     made: Any = field(metadata={HOW: value})  # type checkers take it for what `value` returns
     return made
 
 
-def later_column(value: Callable[[Measured], T], *, older: T) -> T:
+def later_column(value: Callable[[Measurements], T], *, older: T) -> T:
     """Return a column that was added later: older files are read with `older` in its place."""
     made: Any = field(default=older, metadata={HOW: value})
     return made
