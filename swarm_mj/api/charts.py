@@ -19,9 +19,12 @@ from swarm_mj.evaluation.table import missions_of
 
 Course = Float[np.ndarray, "T"]
 
-PANEL_IN, ROW_IN, HEAD_IN = 2.1, 0.32, 1.1
+PANEL_IN = 2.1  # of a cost over time
+ROW_IN = 0.32  # of a policy
+HEAD_IN = 1.1  # of title and axis
 TITLE_PT = 10.0
-LINE_IN, CHARACTERS = 0.16, 92  # of a title
+LINE_IN = 0.16  # of a title
+CHARACTERS = 92  # of a line of a title
 FOOT_IN = 0.2
 UNHEARD = "#eef0f4"  # behind the windows before everyone has heard of everyone
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
@@ -35,7 +38,18 @@ def draw_flight(
     window_s: float,
     own_cost: tuple[str, str] | None,
 ) -> Figure:
-    """Chart a mission's costs over its windows; `own_cost` is the task cost's name and unit."""
+    """Chart a mission's costs over its windows, the age above the task's own cost.
+
+    Args:
+        columns: As `Run.columns` returns them, each [T].
+        title: What was flown, in a line.
+        policy: By which curves have their colour.
+        window_s: How long a window is [s].
+        own_cost: The name and the unit of the task's cost; None if it has none.
+
+    Returns:
+        The figure, 7.5 inches wide.
+    """
     colour = look_of(policy).colour
     number = 2 if own_cost else 1
     with style.styled():
@@ -45,7 +59,8 @@ def draw_flight(
         _draw_age(axes[0], columns, colour)
         if own_cost:
             name, unit = own_cost
-            cost, least = columns["task_cost"], 0.0
+            cost = columns["task_cost"]
+            least = 0.0
             axes[1].plot(columns["window"], cost, color=colour)
             axes[1].set_ylabel(f"{name}\n[{unit}]")
             if name == Flocking.cost_name:
@@ -58,13 +73,19 @@ def draw_flight(
 
 
 def draw_evaluation(results: Sequence[Result]) -> Figure:
-    """Return a chart of policies by missions, the lowest age first; flocks have variances, too."""
+    """Return a chart of policies, the lowest age first; flocks have variances, too.
+
+    Args:
+        results: Of any missions; policies that flew the same ones stand in one chart.
+
+    Returns:
+        The figure: a chart for each kind of missions, with its title, below each other.
+    """
     groups = {said: list(its) for said, its in groupby(results, missions_of)}
     titles = [textwrap.wrap(said, CHARACTERS, break_on_hyphens=False) for said in groups]
-    heights_in = [
-        HEAD_IN + LINE_IN * (len(title) - 1) + ROW_IN * len(shown)
-        for title, shown in zip(titles, groups.values(), strict=True)
-    ]
+    heights_in = []
+    for title, shown in zip(titles, groups.values(), strict=True):
+        heights_in.append(HEAD_IN + LINE_IN * (len(title) - 1) + ROW_IN * len(shown))
     with style.styled():
         size_in = style.WIDTH_IN, sum(heights_in) + FOOT_IN
         figure = plt.figure(figsize=size_in, layout="constrained")
@@ -82,7 +103,14 @@ def draw_learning(
 ) -> Figure:
     """Return a chart of learning curves, and policies' ages as levels, on the same missions.
 
-    A line has its team decisions, its ages, and the ends of their band [windows].
+    Args:
+        lines: By their labels, each with the team decisions, the ages, and the lower and the
+            upper end of their band [windows].
+        levels: The ages of policies by their names [windows].
+        origin: Where the numbers are from, for the caption.
+
+    Returns:
+        The figure: ages, on a logarithmic axis, over team decisions.
     """
     with style.styled():
         figure, (axes,) = _axes("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
@@ -111,9 +139,14 @@ def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:
         each.set_xlabel(LABELS[cost].replace("\n", " "))
         each.grid(visible=False, axis="y")
         each.set_xlim(left=0.0)
-    names = [look_of(each.policy).label + " +" * carries_more(each) for each in shown]
-    axes[0].set_yticks(range(len(shown)), names)
+    axes[0].set_yticks(range(len(shown)), [_name_of(each) for each in shown])
     axes[0].set_ylim(len(shown) - 0.5, -0.5)
+
+
+def _name_of(result: Result) -> str:
+    """Return a policy's name, marked where its packets carry more than T, M and P."""
+    label = look_of(result.policy).label
+    return f"{label} +" if carries_more(result) else label
 
 
 def _origin(results: Sequence[Result]) -> str:
@@ -129,13 +162,14 @@ def _origin(results: Sequence[Result]) -> str:
 
 def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     if "aoi_worst" in columns:
-        look = {"color": style.FAINT, "lw": 0.8, "label": "worst pair"}
-        axes.plot(columns["window"], columns["aoi_worst"], **look)
+        worst = columns["aoi_worst"]
+        axes.plot(columns["window"], worst, color=style.FAINT, linewidth=0.8, label="worst pair")
     axes.plot(columns["window"], columns["aoi"], color=colour, label="mean over all pairs")
     axes.set_ylabel(LABELS["aoi"])
     axes.set_ylim(bottom=0.0)
-    done = np.flatnonzero(columns["is_complete"])
-    end = columns["window"][done[0] if len(done) else -1]
+    complete = np.flatnonzero(columns["is_complete"])
+    first_complete = complete[0] if len(complete) > 0 else -1
+    end = columns["window"][first_complete]
     if end > columns["window"][0]:
         label = "not everyone has heard of everyone yet"
         axes.axvspan(columns["window"][0], end, color=UNHEARD, linewidth=0.0, label=label, zorder=0)
@@ -145,9 +179,10 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
 def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
     """Draw a policy's mean with its 95 % interval, if there is one."""
     look, mean = look_of(result.policy), getattr(result, f"{cost}_mean")
-    ends = [getattr(result, f"{cost}_ci_{end}") for end in ("low", "high")]
-    if None not in ends:
-        axes.hlines(place, *ends, color=look.colour, linewidth=3.0, alpha=0.45)
+    low = getattr(result, f"{cost}_ci_low")
+    high = getattr(result, f"{cost}_ci_high")
+    if low is not None and high is not None:
+        axes.hlines(place, low, high, color=look.colour, linewidth=3.0, alpha=0.45)
     axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.marker_size + 2.0)
 
 

@@ -1,7 +1,7 @@
 """A still map of one window, for a slide: robots by age, their trails, and packets on the way."""
 
 import textwrap
-from typing import Any
+from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -20,30 +20,57 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
 from swarm_mj.system.packages import version
 
-WIDTH_IN, HEIGHT_IN, DPI = 12.8, 7.2, 150  # 1920 by 1080 pixels
-MAP_IN, LEFT_IN, BOTTOM_IN = 6.3, 0.85, 0.6  # the map's side, and where it stands
-TEXT_IN, RAMP_IN = 7.75, 4.4  # where what is written begins, and how long the ramp of ages is
+# The picture: 1920 by 1080 pixels.
+WIDTH_IN = 12.8
+HEIGHT_IN = 7.2
+DPI = 150
+# The map's side, and where it stands.
+MAP_IN = 6.3
+LEFT_IN = 0.85
+BOTTOM_IN = 0.6
 MARGIN = 1.04  # of the map, around what it must show
-TRAIL_WINDOWS, PIECES = 300, 15  # of a trail, and how many shades it fades in
-FAINTEST, BRIGHTEST = 0.08, 0.75  # of a trail's ends
-SMALLEST_PT, LARGEST_PT, CROWD_PT = 6.5, 13.0, 75.0  # a robot's size: the last by the root of N
-LARGE_PT, TEXT_PT, SMALL_PT = 22.0, 13.0, 10.5
+TEXT_IN = 7.75  # where what is written begins
+RAMP_IN = 4.4  # how long the ramp of ages is
+# Trails, which fade towards their beginnings.
+TRAIL_WINDOWS = 300
+PIECES = 15  # in which they fade
+FAINTEST = 0.08  # opacity of the first
+BRIGHTEST = 0.75  # and of the last
+# A robot's size: CROWD_PT over the root of N, within these limits.
+SMALLEST_PT = 6.5
+LARGEST_PT = 13.0
+CROWD_PT = 75.0
+# Sizes of type.
+LARGE_PT = 22.0
+TEXT_PT = 13.0
+SMALL_PT = 10.5
 LINE = 1.45  # of a line's height, by the size of its type
 CHARACTERS = 52  # of a line
 POINTS_PER_IN = 72.0
 
 
 def draw_picture(footage: Footage, window: int | None = None) -> Figure:
-    """Return a map of one window, 16 by 9, the last unless given; ValueError if there is none."""
+    """Return a map of one window, 16 by 9.
+
+    Args:
+        footage: A flight's log, or what `read_footage` read from its replay.
+        window: The window's number, 1 for a mission's first; None is the last.
+
+    Returns:
+        The figure, 1920 by 1080 pixels unless it is saved otherwise.
+
+    Raises:
+        ValueError: There is no such window.
+    """
     row = _row(footage, window)
     with styled():
         figure = plt.figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI)
         figure.set_facecolor(_rgb(palette.BACKGROUND))
-        sides = LEFT_IN / WIDTH_IN, BOTTOM_IN / HEIGHT_IN, MAP_IN / WIDTH_IN, MAP_IN / HEIGHT_IN
-        axes = figure.add_axes(sides)
+        axes = figure.add_axes(_share(LEFT_IN, BOTTOM_IN, MAP_IN, MAP_IN))
         radius_m = _frame(axes, footage, row)
         shown = _draw_ground(axes, footage)
-        if np.ptp(_trails(footage, row), axis=0).max() > radius_m:  # or else robots hide them
+        longest_m = np.ptp(_trails(footage, row), axis=0).max()
+        if longest_m > radius_m:  # or else robots hide them
             shown.append(_draw_trails(axes, footage, row))
         shown += _draw_robots(axes, footage, row)
         shown += _draw_packets(axes, footage, row, radius_m)
@@ -58,6 +85,18 @@ def _row(footage: Footage, window: int | None) -> int:
     if window is not None and window not in windows:
         raise ValueError(f"window must be from {windows[0]} to {windows[-1]}, not {window}")
     return len(windows) - 1 if window is None else windows.index(window)
+
+
+def _share(
+    left_in: float, bottom_in: float, width_in: float, height_in: float
+) -> tuple[float, float, float, float]:
+    """Return a place on the picture as matplotlib takes it: by the picture's width and height."""
+    return (
+        left_in / WIDTH_IN,
+        bottom_in / HEIGHT_IN,
+        width_in / WIDTH_IN,
+        height_in / HEIGHT_IN,
+    )
 
 
 def _rgb(colour: palette.Colour) -> str:
@@ -79,11 +118,13 @@ def _frame(axes: Axes, footage: Footage, row: int) -> float:
     """Set the map's limits around area, robots and trails; return a robot's radius on it [m]."""
     trails_m = _trails(footage, row).reshape(1, -1, 2)
     ground = frame(trails_m, footage.facts.mission.half_side_m)
-    (x, y), reach_m = ground.centre_m[0], MARGIN * ground.reach_m
+    x, y = ground.centre_m[0]
+    reach_m = MARGIN * ground.reach_m
     axes.set(xlim=(x - reach_m, x + reach_m), ylim=(y - reach_m, y + reach_m), aspect="equal")
     axes.set_facecolor(_rgb(palette.BACKGROUND))
     axes.grid(color=_rgb(palette.GRID), linewidth=0.8)
-    faint, grey = _rgb(palette.WALL), _rgb(palette.SENT)
+    faint = _rgb(palette.WALL)
+    grey = _rgb(palette.SENT)
     axes.set_xlabel("x [m]", fontsize=TEXT_PT, color=grey)
     axes.set_ylabel("y [m]", fontsize=TEXT_PT, color=grey)
     axes.tick_params(colors=faint, labelcolor=grey, labelsize=SMALL_PT)
@@ -94,16 +135,20 @@ def _frame(axes: Axes, footage: Footage, row: int) -> float:
 def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     """Draw area and obstacles; return samples for the legend."""
     mission = footage.facts.mission
-    low_m, side_m = -mission.half_side_m, mission.side_m
-    line: dict[str, Any] = {"linestyle": "-" if mission.has_walls else "--", "linewidth": 1.2}
-    line["color"] = _rgb(palette.WALL)
-    axes.add_patch(Rectangle((low_m, low_m), side_m, side_m, fill=False, zorder=1.0, **line))
-    shown = [Line2D([], [], label="wall of the area" if mission.has_walls else "area", **line)]
+    low_m = -mission.half_side_m
+    side_m = mission.side_m
+    colour = _rgb(palette.WALL)
+    dashes = "-" if mission.has_walls else "--"
+    border = Rectangle((low_m, low_m), side_m, side_m, fill=False, zorder=1.0)
+    border.set(linestyle=dashes, linewidth=1.2, edgecolor=colour)
+    axes.add_patch(border)
+    label = "wall of the area" if mission.has_walls else "area"
+    shown = [Line2D([], [], linestyle=dashes, linewidth=1.2, color=colour, label=label)]
     obstacles = arenas.obstacles_of(scene.compose(mission, scene=footage.scene).compile())
     if len(obstacles.kind) > 0:
-        inside, edge = _rgb(palette.OUTLINE), _rgb(palette.WALL)
         for outline_m in outlines.footprints(obstacles, state.ROBOT_HEIGHT_M):
-            block = Polygon(outline_m, facecolor=inside, edgecolor=edge, linewidth=0.8, zorder=1.5)
+            block = Polygon(outline_m, linewidth=0.8, zorder=1.5)
+            block.set(facecolor=_rgb(palette.OUTLINE), edgecolor=colour)
             axes.add_patch(block)
         shown.append(_dot("obstacle", palette.OUTLINE, "s", palette.WALL))
     return shown
@@ -129,12 +174,21 @@ def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
     off = footage.is_cut_off[row]
     if np.any(off):
         axes.scatter(x[off], y[off], s=3.2 * size, color=_rgb(palette.CUT_OFF), zorder=3.0)
-    colours, edge = footage.colours[row] / 255.0, _rgb(palette.BACKGROUND)
+    colours = footage.colours[row] / 255.0
+    edge = _rgb(palette.BACKGROUND)
     axes.scatter(x, y, s=size, c=colours, edgecolors=edge, linewidths=0.8, zorder=4.0)
-    own, beside_pt = footage.ego, 0.7 * _size_pt(footage)
-    look: dict[str, Any] = {"color": _rgb(palette.EGO), "fontsize": TEXT_PT, "fontweight": "bold"}
-    place: dict[str, Any] = {"xytext": (beside_pt, beside_pt), "textcoords": "offset points"}
-    axes.annotate(f"r{own}", (x[own], y[own]), zorder=6.0, **place, **look)
+    own = footage.ego
+    beside_pt = 0.7 * _size_pt(footage)
+    axes.annotate(
+        f"r{own}",
+        xy=(x[own], y[own]),
+        xytext=(beside_pt, beside_pt),
+        textcoords="offset points",
+        color=_rgb(palette.EGO),
+        fontsize=TEXT_PT,
+        fontweight="bold",
+        zorder=6.0,
+    )
     shown = [_dot(f"r{own}, whose knowledge is shown", palette.EGO)]
     if np.any(np.isnan(footage.known_age[row]) & footage.is_on[row]):
         shown.append(_dot("never heard of", palette.UNKNOWN))
@@ -156,14 +210,25 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
             continue
         # From rim to rim, so that no robot hides an arrow's head.
         rim_m = radius_m * way_m[far] / span_m[far]
-        start_m, along_m = packets.start_m[far] + rim_m, way_m[far] - 2.0 * rim_m
+        start_m = packets.start_m[far] + rim_m
+        along_m = way_m[far] - 2.0 * rim_m
         colour = _rgb(palette.PACKETS[fate].colour)
-        how = {"angles": "xy", "scale_units": "xy", "scale": 1.0, "width": 0.0028, "headwidth": 4.5}
-        x, y, along_x, along_y = np.hstack([start_m, along_m]).T
-        axes.quiver(x, y, along_x, along_y, color=colour, zorder=5.0, alpha=0.9, **how)
-        shown.append(
-            Line2D([], [], color=colour, marker=">", markevery=[1], label=f"packet {fate}")
+        axes.quiver(
+            start_m[:, 0],
+            start_m[:, 1],
+            along_m[:, 0],
+            along_m[:, 1],
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+            width=0.0028,
+            headwidth=4.5,
+            color=colour,
+            alpha=0.9,
+            zorder=5.0,
         )
+        label = f"packet {fate}"
+        shown.append(Line2D([], [], color=colour, marker=">", markevery=[1], label=label))
     return shown
 
 
@@ -175,35 +240,51 @@ def _dot(
     return dot
 
 
-def _write(figure: Figure, footage: Footage, row: int) -> float:
-    """Write title and time beside the map; return how high the last line stands [in]."""
-    facts, mission = footage.facts, footage.facts.mission
-    where = [*where_flown(mission), *facts.own_parts]
+class _Line(NamedTuple):
+    """A line of text beside the map."""
+
+    text: str
+    size_pt: float
+    colour: palette.Colour
+
+
+def _lines(footage: Footage, row: int) -> list[_Line]:
+    """Return title, mission and time."""
+    facts = footage.facts
+    mission = facts.mission
+    lines = [_Line(facts.policy or "a mission", LARGE_PT, palette.TEXT)]
     about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
+    lines += [_Line(each, TEXT_PT, palette.TEXT) for each in textwrap.wrap(about, CHARACTERS)]
+    where = ", ".join([*where_flown(mission), *facts.own_parts])
+    wrapped = textwrap.wrap(where, CHARACTERS, break_on_hyphens=False)
+    lines += [_Line(each, SMALL_PT, palette.SENT) for each in wrapped]
     now = footage.window[row]
-    lines = [(facts.policy or "a mission", LARGE_PT, palette.TEXT)]
-    lines += [(each, TEXT_PT, palette.TEXT) for each in textwrap.wrap(about, CHARACTERS)]
-    said = textwrap.wrap(", ".join(where), CHARACTERS, break_on_hyphens=False)
-    lines += [(each, SMALL_PT, palette.SENT) for each in said]
     time = f"{now * mission.window_s:.1f} s, window {now} of {mission.num_windows}"
-    lines.append((time, TEXT_PT, palette.TEXT))
+    lines.append(_Line(time, TEXT_PT, palette.TEXT))
     if np.isfinite(footage.age_mean[row]):
         age = f"mean age of information: {footage.age_mean[row]:.1f} windows"
-        lines.append((age, TEXT_PT, palette.MEAN_AGE))
+        lines.append(_Line(age, TEXT_PT, palette.MEAN_AGE))
+    return lines
+
+
+def _write(figure: Figure, footage: Footage, row: int) -> float:
+    """Write title and time beside the map; return how high the last line stands [in]."""
+    x = TEXT_IN / WIDTH_IN
     y_in = HEIGHT_IN - 0.3
-    for text, size, colour in lines:
-        y_in -= LINE * size / POINTS_PER_IN
-        x, y = TEXT_IN / WIDTH_IN, y_in / HEIGHT_IN
-        figure.text(x, y, escape_mathtext(text), fontsize=size, color=_rgb(colour))
-    x, y = TEXT_IN / WIDTH_IN, BOTTOM_IN / HEIGHT_IN
-    figure.text(x, y, f"swarm_mj {version()}", fontsize=8.0, color=_rgb(palette.WALL), gid=CAPTION)
+    for line in _lines(footage, row):
+        y_in -= LINE * line.size_pt / POINTS_PER_IN
+        text = escape_mathtext(line.text)
+        colour = _rgb(line.colour)
+        figure.text(x, y_in / HEIGHT_IN, text, fontsize=line.size_pt, color=colour)
+    made_by = f"swarm_mj {version()}"
+    colour = _rgb(palette.WALL)
+    figure.text(x, BOTTOM_IN / HEIGHT_IN, made_by, fontsize=8.0, color=colour, gid=CAPTION)
     return y_in
 
 
 def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
     full = footage.facts.full_scale
-    place = TEXT_IN / WIDTH_IN, (below_in - 0.75) / HEIGHT_IN, RAMP_IN / WIDTH_IN, 0.2 / HEIGHT_IN
-    axes = figure.add_axes(place)
+    axes = figure.add_axes(_share(TEXT_IN, below_in - 0.75, RAMP_IN, 0.2))
     ages = np.linspace(0.0, full, 256)
     axes.imshow(palette.age_colours(ages, full)[None], aspect="auto", extent=(0.0, full, 0.0, 1.0))
     title = f"age of what r{footage.ego} knows of a robot [windows]"
@@ -216,7 +297,14 @@ def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
 
 
 def _draw_legend(figure: Figure, shown: list[Line2D], below_in: float) -> None:
-    place = (TEXT_IN - 0.05) / WIDTH_IN, (below_in - 0.4) / HEIGHT_IN
-    look: dict[str, Any] = {"frameon": False, "fontsize": TEXT_PT, "labelcolor": _rgb(palette.SENT)}
-    room: dict[str, Any] = {"borderpad": 0.0, "borderaxespad": 0.0, "labelspacing": 0.6}
-    figure.legend(handles=shown, loc="upper left", bbox_to_anchor=place, **look, **room)
+    figure.legend(
+        handles=shown,
+        loc="upper left",
+        bbox_to_anchor=((TEXT_IN - 0.05) / WIDTH_IN, (below_in - 0.4) / HEIGHT_IN),
+        frameon=False,
+        fontsize=TEXT_PT,
+        labelcolor=_rgb(palette.SENT),
+        borderpad=0.0,
+        borderaxespad=0.0,
+        labelspacing=0.6,
+    )

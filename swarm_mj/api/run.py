@@ -1,7 +1,7 @@
 """The result of `swarm_mj.fly`: numbers, a table, a chart, files, a video."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
 from operator import attrgetter
@@ -68,12 +68,26 @@ class Metrics(dict[str, Any]):
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class Run:
-    """One mission flown; ModuleNotFoundError says which package a table, chart or file lacks.
+    """One mission flown: what `swarm_mj.fly` returns.
 
-    `mission` has its numbers; `config` everything that makes this flight again: mission, policy,
-    seed, version and commit; `summary` its costs, by the names that `swarm-mj fly --json` uses:
-    `summary.aoi_mean` is the age of information [windows]; `windows` the costs of each window;
-    `log` the record that a replay shows, and None if nothing was recorded.
+    A table, chart or file that needs a package which is not installed raises ModuleNotFoundError
+    that names it.
+
+    Attributes:
+        mission: The mission's numbers.
+        config: Everything that makes this flight again: mission, policy, seed, version, commit.
+        summary: The flight's costs by the names that `swarm-mj fly --json` uses:
+            `summary.aoi_mean` is the age of information [windows].
+        windows: The costs of each window.
+        log: The record that a replay shows; None if nothing was recorded.
+
+    Example:
+        ```python
+        run = swarm_mj.fly("flocking", policy="planner", seed=1)
+        print(run.summary.aoi_mean)
+        run.plot().savefig("age.png")
+        run.save("flight.rrd")
+        ```
     """
 
     mission: Mission
@@ -83,8 +97,8 @@ class Run:
     log: Log | None = None
 
     def __repr__(self) -> str:
-        age, window_s = self.summary.aoi_mean, self.mission.window_s
-        cost = f"age of information {age:.2f} windows ({age * window_s:.2g} s)"
+        age = self.summary.aoi_mean
+        cost = f"age of information {age:.2f} windows ({age * self.mission.window_s:.2g} s)"
         return f"<Run {self.title}: {cost} over {len(self.windows)} windows>"
 
     def _repr_html_(self) -> str:
@@ -114,25 +128,36 @@ class Run:
         return None if cost is None else (cost.name, cost.unit)
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
-        """Return the flight window by window, column by column: all that `to_dataframe` has."""
+        """Return the flight window by window, column by column.
+
+        Returns:
+            The columns of `to_dataframe`, in its order, each with a number for each window.
+        """
         window = np.arange(1.0, len(self.windows) + 1.0)
-        clock = {"window": window, "seconds": np.round(window * self.mission.window_s, 9)}
-        flown = {
-            name: np.concatenate([attrgetter(place)(each) for each in self.windows]).astype(float)
-            for name, place in PLACES.items()
-            if name != "task_cost" or self.task_cost is not None
-        }
-        worst = {} if self.log is None else {"aoi_worst": self.log.age_max}
-        return {**clock, "aoi": flown.pop("aoi"), **worst, **flown}
+        columns = {"window": window, "seconds": np.round(window * self.mission.window_s, 9)}
+        for name, place in PLACES.items():
+            if name == "task_cost" and self.task_cost is None:
+                continue
+            number_of = attrgetter(place)
+            flown = np.concatenate([number_of(each) for each in self.windows])
+            columns[name] = flown.astype(float)
+            if name == "aoi" and self.log is not None:  # the mean, and beside it the worst
+                columns["aoi_worst"] = self.log.age_max
+        return columns
 
     def to_dataframe(self) -> "DataFrame":
-        """Return one row per window, at its end; what is not defined for the policy is nan.
+        """Return one row per window, at its end.
 
-        The columns are `window` (1 is the first), `seconds`, `aoi` (age of information, mean over
-        pairs of robots [windows]), `aoi_worst` (the worst pair's, if the flight was recorded),
-        `velocity_variance` [m²/s²], `task_cost` (where the task has one; `summary.task_cost_name`
-        names it), `hops` (mean over all known teammates), `is_complete` (every robot knows every
-        other) and `packets_...` in that window.
+        Returns:
+            A table with the columns `window` (1 is the first), `seconds`, `aoi` (age of
+            information, mean over pairs of robots [windows]), `aoi_worst` (the worst pair's, if
+            the flight was recorded), `velocity_variance` [m²/s²], `task_cost` (where the task has
+            one; `summary.task_cost_name` names it), `hops` (mean over all known teammates),
+            `is_complete` (every robot knows every other) and `packets_...` in that window. What is
+            not defined for the policy is nan.
+
+        Raises:
+            ModuleNotFoundError: pandas is not installed.
         """
         need("pandas", "a table")
         from pandas import DataFrame
@@ -142,20 +167,48 @@ class Run:
     def plot(self) -> "Figure":
         """Draw the age of information over time and, below, the task's cost.
 
-        Of flocks that is the velocity variance. A notebook shows the figure where it is the cell's
-        result, `savefig` keeps it, and `matplotlib.pyplot.show()` opens a window.
+        Of flocks that is the velocity variance.
+
+        Returns:
+            A figure of matplotlib's. A notebook shows it where it is the cell's result, `savefig`
+            keeps it, and `matplotlib.pyplot.show()` opens a window.
+
+        Raises:
+            ModuleNotFoundError: matplotlib is not installed.
+
+        Example:
+            ```python
+            swarm_mj.fly("flocking").plot().savefig("age.png")
+            ```
         """
         need("matplotlib", "a chart")
         from swarm_mj.api.charts import draw_flight
 
-        policy, window_s = self.config["policy"], self.mission.window_s
-        return draw_flight(self.columns(), self.title, policy, window_s, self.task_cost)
+        return draw_flight(
+            columns=self.columns(),
+            title=self.title,
+            policy=self.config["policy"],
+            window_s=self.mission.window_s,
+            own_cost=self.task_cost,
+        )
 
     def picture(self, window: int | None = None) -> "Figure":
         """Draw a map of one window, for a slide: robots by age, trails, packets, obstacles.
 
-        It is the last window unless given; 1 is the first. Colours are those of the replay. Raises
-        ValueError if there is no such window, or nothing was recorded.
+        Args:
+            window: The window's number, 1 for the first; None is the last.
+
+        Returns:
+            A figure of matplotlib's, 16 by 9, in the replay's colours.
+
+        Raises:
+            ValueError: There is no such window, or nothing was recorded.
+            ModuleNotFoundError: matplotlib is not installed.
+
+        Example:
+            ```python
+            swarm_mj.fly("flocking", num_robots=20).picture(100).savefig("flock.png")
+            ```
         """
         footage = self.footage()
         need("matplotlib", "a picture")
@@ -166,8 +219,10 @@ class Run:
     def show(self) -> None:
         """Play the flight as a video, in a notebook; elsewhere, say how to see it.
 
-        Raises ValueError if nothing was recorded that a video shows, and OSError if no OpenGL works
-        here; it says what to install.
+        Raises:
+            ValueError: Nothing was recorded that a video shows.
+            OSError: No OpenGL works here; the message says what to install.
+            ModuleNotFoundError: A package that makes videos is not installed.
         """
         if not is_notebook():
             self.footage()  # says if there is none
@@ -176,29 +231,54 @@ class Run:
         content = self._film(".mp4")
         from IPython.display import Video, display
 
-        how = {"embed": True, "mimetype": "video/mp4", "html_attributes": "controls loop"}
-        display(Video(data=content, **how))
+        video = Video(
+            data=content, embed=True, mimetype="video/mp4", html_attributes="controls loop"
+        )
+        display(video)
 
     def footage(self) -> Log:
-        """Return the pictures' data; `rendering.video.make_video` puts two side by side.
+        """Return what pictures and videos show.
 
-        Raises ValueError if nothing was recorded.
+        Returns:
+            The log. `swarm_mj.replay.rendering.video.make_video` makes a video of one or of two
+            side by side.
+
+        Raises:
+            ValueError: Nothing was recorded.
         """
         if self.log is None:
             raise ValueError("nothing was recorded that could be shown; fly with record=True")
         return self.log
 
     def report(self, replay: Path | None = None) -> dict[str, Any]:
-        """Return config and summary, as `swarm-mj fly --json` writes them."""
-        return {"config": dict(self.config), **self.summary, "replay": replay and str(replay)}
+        """Return config and summary, as `swarm-mj fly --json` writes them.
+
+        Args:
+            replay: Where the flight's replay was written, if it was.
+        """
+        shown = None if replay is None else str(replay)
+        return {"config": dict(self.config), **self.summary, "replay": shown}
 
     def save(self, path: str | Path) -> Path:
-        """Write the flight, replacing the file if it exists; return the path.
+        """Write the flight to a file, which is replaced if it exists.
 
-        By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the summary as
-        `swarm-mj fly --json` writes it (.json), or one row per window (.csv). Raises ValueError if
-        the name has another ending, or nothing was recorded that it would show; OSError if the file
-        cannot be written, or no OpenGL works here.
+        Args:
+            path: By its ending, a replay for `swarm-mj replay` (.rrd), a video (.mp4, .gif), the
+                summary as `swarm-mj fly --json` writes it (.json), or one row per window (.csv).
+
+        Returns:
+            The path.
+
+        Raises:
+            ValueError: The name has another ending, or nothing was recorded that it would show.
+            OSError: The file cannot be written, or no OpenGL works here.
+            ModuleNotFoundError: A package that writes such a file is not installed.
+
+        Example:
+            ```python
+            run.save("flight.rrd")  # `swarm-mj replay flight.rrd` opens it
+            run.save("windows.csv")
+            ```
         """
         path = Path(path)
         check_outputs(Output("the file", path, ".rrd|.mp4|.gif|.json|.csv"))
@@ -213,15 +293,17 @@ class Run:
             case ".json":
                 write_json(path, self.report())
             case ".csv":
-                columns = self.columns()
-                rows = np.column_stack(list(columns.values())).tolist()
-                # None, an empty cell, is what is not defined.
-                shown = ([None if math.isnan(x) else as_typed(x) for x in row] for row in rows)
-                cells = (dict(zip(columns, row, strict=True)) for row in shown)
-                write_csv(path, list(columns), cells)
+                write_csv(path, list(self.columns()), self._cells())
             case ending:
                 write_bytes(path, self._film(ending))
         return path
+
+    def _cells(self) -> Iterator[dict[str, Any]]:
+        """Return the rows of a table of windows; None, an empty cell, is what is not defined."""
+        columns = self.columns()
+        for row in np.column_stack(list(columns.values())).tolist():
+            shown = [None if math.isnan(number) else as_typed(number) for number in row]
+            yield dict(zip(columns, shown, strict=True))
 
     def _film(self, ending: str) -> bytes:
         """Return the content of a video file, as `swarm-mj replay --video` makes it."""
@@ -230,7 +312,8 @@ class Run:
             need(module, "a video")
         from swarm_mj.replay.rendering.video import make_video
 
-        style = fitted(replace(DEFAULTS[ending], seconds=default_seconds([footage])), ending)
+        style = replace(DEFAULTS[ending], seconds=default_seconds([footage]))
+        style = fitted(style, ending)
         console = terminal.quiet_console()
         with terminal.WorkBar("Drawing", style.num_frames, "pictures", console=console) as bar:
             return make_video([footage], ending, style, bar.advance)

@@ -97,6 +97,33 @@ def check_observer(observer: int, num_robots: int) -> None:
         raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {observer!r}")
 
 
+class _Row(NamedTuple):
+    """What one window leaves of a mission, or, of all windows, arrays with their axis first."""
+
+    position_m: Float[np.ndarray, "*T N 2"]
+    velocity_mps: Float[np.ndarray, "*T N 2"]
+    recipient: Int[np.ndarray, "*T 2 N"]
+    heard: Int[np.ndarray, "*T 2 N"]
+    is_on: Bool[np.ndarray, "*T N"]
+    believed_m: Float[np.ndarray, "*T N 2"]
+    ego_age: Float[np.ndarray, "*T N"]
+    known_age: Float[np.ndarray, "*T N"]
+    parent: Int[np.ndarray, "*T N"]
+    age_mean: Float[np.ndarray, "*T"]
+    age_std: Float[np.ndarray, "*T"]
+    age_max: Float[np.ndarray, "*T"]
+    velocity_variance_m2ps2: Float[np.ndarray, "*T"]
+
+
+class _Compared(NamedTuple):
+    """What comes from snapshots of the radio, of which free space has none."""
+
+    is_cut_off: Bool[np.ndarray, "T N"]
+    mismatch: links.LinkMismatch
+    num_believed: Int[np.ndarray, "C"]
+    num_working: Int[np.ndarray, "C"]
+
+
 class Recorder:
     """Copies what a replay shows from one of a swarm's missions, window by window."""
 
@@ -108,65 +135,80 @@ class Recorder:
         matrices_bytes = AGE_BYTES * len(self._in_matrix) ** 2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._radio_stride = links.stride_of(swarm, self._stride)
-        self._swarm, self._ego, self._index = swarm, ego, index
-        self._rows: list[dict[str, np.ndarray]] = []
+        self._swarm = swarm
+        self._ego = ego
+        self._index = index
+        self._rows: list[_Row] = []
         self._age: list[np.ndarray] = []
         self._task_costs: list[TaskCost] = []
         self._snapshots: list[links.RadioSnapshot] = []  # none in free space
 
     def add(self, flown: WindowRecord | None = None) -> None:
         """Record the window that was just flown, if any, with its costs, if they are known."""
-        swarm, index, own = self._swarm, self._index, self._ego
-        buffers, states, phases = swarm.buffers, swarm.states, swarm.phases
-        now, timestamp = swarm.now[index], buffers.timestamp[index]
+        swarm = self._swarm
+        index = self._index
+        own = self._ego
+        buffers = swarm.buffers
+        states = swarm.states
+        now = swarm.now[index]
+        timestamp = buffers.timestamp[index]
         robots = np.arange(len(timestamp))
         is_on = np.ones(len(robots), bool) if states.is_active is None else states.is_active[index]
         age_std, age_max = _age_spread(timestamp, now, is_on)
         if len(self._rows) % self._stride == 0:
             some = timestamp[np.ix_(self._in_matrix, self._in_matrix)]
             self._age.append((now - some).astype(np.float32))
-        ego_age, is_granted = now - timestamp[own], buffers.is_granted[index]
-        is_due = len(self._rows) % self._radio_stride == 0
-        if is_due and (snapshot := links.radio_snapshot(swarm, index)) is not None:
-            self._snapshots.append(snapshot)
-        age_mean = velocity_variance = np.nan
+        if len(self._rows) % self._radio_stride == 0:
+            snapshot = links.radio_snapshot(swarm, index)
+            if snapshot is not None:
+                self._snapshots.append(snapshot)
+        ego_age = now - timestamp[own]
+        is_known = (timestamp[own] > NEVER) | buffers.is_granted[index]
+        age_mean = np.nan
+        velocity_variance = np.nan
         if flown is not None:
             age_mean = flown.costs.age_windows[index]
             velocity_variance = flown.costs.velocity_variance_m2ps2[index]
             if flown.costs.task_cost is not None:
                 self._task_costs.append(flown.costs.task_cost)
-        silence = [robots, robots]  # of a mission that has not begun
-        shown = {
-            "position_m": states.position_m[index],
-            "velocity_mps": states.velocity_mps[index],
-            "recipient": [phase.recipient[index] for phase in phases] or silence,
-            "heard": [phase.heard[index] for phase in phases] or silence,
-            "is_on": is_on,
-            "believed_m": buffers.position_m[index, own],
-            "ego_age": ego_age,
-            "known_age": np.where((timestamp[own] > NEVER) | is_granted, ego_age, np.nan),
-            "parent": buffers.parent[index, own],
-            "age_mean": age_mean,
-            "age_std": age_std,
-            "age_max": age_max,
-            "velocity_variance_m2ps2": velocity_variance,
-        }
-        # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix. The
-        # row comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
-        self._rows.append({name: np.array(value) for name, value in shown.items()})
+        recipient = [robots, robots]  # silence, of a mission that has not begun
+        heard = [robots, robots]
+        if swarm.phases:
+            recipient = [phase.recipient[index] for phase in swarm.phases]
+            heard = [phase.heard[index] for phase in swarm.phases]
+        # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
+        row = _Row(
+            position_m=np.array(states.position_m[index]),
+            velocity_mps=np.array(states.velocity_mps[index]),
+            recipient=np.array(recipient),
+            heard=np.array(heard),
+            is_on=np.array(is_on),
+            believed_m=np.array(buffers.position_m[index, own]),
+            ego_age=ego_age,
+            known_age=np.where(is_known, ego_age, np.nan),
+            parent=np.array(buffers.parent[index, own]),
+            age_mean=np.array(age_mean),
+            age_std=np.array(age_std),
+            age_max=np.array(age_max),
+            velocity_variance_m2ps2=np.array(velocity_variance),
+        )
+        # It comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
+        self._rows.append(row)
 
     @property
     def num_bytes(self) -> int:
         """The memory taken so far; every window takes the same."""
-        row = sum(value.nbytes for value in self._rows[0].values()) if self._rows else 0
-        compared = (array for each in self._snapshots for array in (each.group, each.links))
-        return len(self._rows) * row + sum(each.nbytes for each in (*self._age, *compared))
+        row_bytes = sum(array.nbytes for array in self._rows[0]) if self._rows else 0
+        ages_bytes = sum(age.nbytes for age in self._age)
+        compared_bytes = sum(each.group.nbytes + each.links.nbytes for each in self._snapshots)
+        return len(self._rows) * row_bytes + ages_bytes + compared_bytes
 
     def log(self, config: Mapping[str, Any] | None = None) -> Log:
         """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
-        columns = {name: np.stack([row[name] for row in self._rows]) for name in self._rows[0]}
+        flown = _Row(*map(np.stack, zip(*self._rows, strict=True)))
+        compared = self._compared(flown.is_on)
         window = np.arange(1, len(self._rows) + 1)
         age_window = window[:: self._stride]
         # An interrupt within `add` leaves one matrix, snapshot or cost too many.
@@ -174,18 +216,35 @@ class Recorder:
         costs = self._task_costs[: len(window)]
         value = np.array([cost.value[self._index] for cost in costs])
         facts = self._facts(config or {}, age)
-        flown = (columns[name] for name in ("recipient", "heard", "position_m"))
+        packets = links.fates(
+            flown.recipient, flown.heard, flown.position_m, is_broadcast=facts.is_broadcast
+        )
         return Log(
             facts=facts,
             window=window,
-            packets=links.fates(*flown, is_broadcast=facts.is_broadcast),
-            ground=shown_ground(columns["position_m"], facts.mission),
+            position_m=flown.position_m,
+            velocity_mps=flown.velocity_mps,
+            is_on=flown.is_on,
+            known_age=flown.known_age,
+            is_cut_off=compared.is_cut_off,
+            age_mean=flown.age_mean,
+            packets=packets,
+            mismatch=compared.mismatch,
+            ground=shown_ground(flown.position_m, facts.mission),
             scene=self._swarm.scene,
+            recipient=flown.recipient,
+            heard=flown.heard,
+            believed_m=flown.believed_m,
+            parent=flown.parent,
+            ego_age=flown.ego_age,
             age_window=age_window,
             age=age,
+            age_std=flown.age_std,
+            age_max=flown.age_max,
+            velocity_variance_m2ps2=flown.velocity_variance_m2ps2,
             task_cost=replace(costs[0], value=value) if costs else None,
-            **columns,
-            **self._compared(columns["is_on"]),
+            num_believed=compared.num_believed,
+            num_working=compared.num_working,
         )
 
     def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K M M"]) -> Facts:
@@ -199,33 +258,43 @@ class Recorder:
             **components_in(config).names,
         )
 
-    def _compared(self, is_on: Bool[np.ndarray, "T N"]) -> dict[str, Any]:
-        """Return the fields of a log that come from snapshots, of which free space has none."""
+    def _compared(self, is_on: Bool[np.ndarray, "T N"]) -> _Compared:
         window = np.arange(1, len(is_on) + 1)[:: self._radio_stride]
         snapshots = self._snapshots[: len(window)]
-        is_cut_off, mismatch = np.zeros_like(is_on), links.NO_MISMATCH
+        is_cut_off = np.zeros_like(is_on)
+        mismatch = links.NO_MISMATCH
         if snapshots:
             for row, snapshot in enumerate(snapshots):
                 snapshot.links["row"] = row
             rows = np.concatenate([snapshot.links for snapshot in snapshots])
-            mismatch = links.LinkMismatch(window, rows)
+            mismatch = links.LinkMismatch(window=window, links=rows)
             group = np.stack([snapshot.group for snapshot in snapshots])
+            # Each snapshot stands until the next.
             group = group[np.arange(len(is_on)) // self._radio_stride]
             is_apart = group != group[:, [self._ego]]
             is_cut_off = is_apart & is_on & is_on[:, [self._ego]]
-        return {
-            "is_cut_off": is_cut_off,
-            "mismatch": mismatch,
-            "num_believed": np.array([snapshot.num_believed for snapshot in snapshots], int),
-            "num_working": np.array([snapshot.num_working for snapshot in snapshots], int),
-        }
+        return _Compared(
+            is_cut_off=is_cut_off,
+            mismatch=mismatch,
+            num_believed=np.array([snapshot.num_believed for snapshot in snapshots], int),
+            num_working=np.array([snapshot.num_working for snapshot in snapshots], int),
+        )
 
 
 def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
     """Return one of a swarm's missions as it is now, with the packets of the window just flown.
 
-    Robots are coloured by what the observer knows of them. Raise IndexError if there is no such
-    mission (those below 0 count from the end), ValueError if there is no such robot.
+    Args:
+        swarm: Of any number of missions.
+        index: The mission; those below 0 count from the end.
+        observer: The robot by whose knowledge robots are coloured.
+
+    Returns:
+        One window of footage, which `SceneRenderer` draws.
+
+    Raises:
+        IndexError: There is no such mission.
+        ValueError: There is no such robot.
     """
     recorder = Recorder(swarm, ego=observer, index=index)
     recorder.add()
@@ -245,14 +314,17 @@ def _age_spread(
 ) -> tuple[float, float]:
     """Return the standard deviation and the worst of ages between robots that are on [windows]."""
     # In loops: of thousands of robots, an array of all pairs takes a gigabyte.
-    num_pairs, total, oldest = 0, 0.0, -np.inf
+    num_pairs = 0
+    total = 0.0
+    oldest = -np.inf
     for i in np.flatnonzero(is_on):
         for j in range(len(is_on)):
             if is_on[j] and j != i:
                 num_pairs += 1
                 total += now - timestamp[i, j]
                 oldest = max(oldest, now - timestamp[i, j])
-    mean, squares = total / num_pairs, 0.0
+    mean = total / num_pairs
+    squares = 0.0
     for i in np.flatnonzero(is_on):
         for j in range(len(is_on)):
             if is_on[j] and j != i:

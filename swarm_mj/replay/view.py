@@ -22,7 +22,8 @@ NOWHERE = f"http://{LOOPBACK}:9"  # a proxy that is not there
 # With CI set rerun does not count its users; its search for newer versions has no switch.
 REPLACED = ("CI", "FORCE_RERUN_ANALYTICS", "ALL_PROXY", "HTTPS_PROXY", "HTTP_PROXY", "NO_PROXY")
 
-LONGEST_S, SHORTEST_S = 10.0, 1.0  # unless given
+LONGEST_S = 10.0  # of a video, unless its length is given
+SHORTEST_S = 1.0  # likewise
 GIF = ".gif"
 TICKS_HZ = 100  # a GIF counts in hundredths of a second
 MIN_TICKS = 2  # viewers show what is shorter much longer

@@ -82,7 +82,7 @@ def test_snapshots_are_taken_every_few_windows_and_groups_stand_until_the_next()
         np.testing.assert_array_equal(shown, expected)
     is_apart = np.array([[of != team[2] for of in team] for team in groups])
     np.testing.assert_array_equal(log.is_cut_off, is_apart)
-    kept = [*record._age, *(value for row in record._rows for value in row.values())]
+    kept = [*record._age, *(value for row in record._rows for value in row)]
     found = sum(seen[w].links.nbytes + seen[w].group.nbytes for w in (0, 5, 10))
     assert record.num_bytes == sum(each.nbytes for each in kept) + found
 
@@ -93,7 +93,7 @@ def test_free_space_has_no_snapshots_and_rows_keep_no_more_than_themselves():
     log = record.log()
     assert not log.is_compared
     assert not np.any(log.is_cut_off)
-    assert all(kept.base is None for kept in record._rows[0].values())
+    assert all(kept.base is None for kept in record._rows[0])
 
 
 def test_large_flights_keep_every_kth_age_matrix(monkeypatch):

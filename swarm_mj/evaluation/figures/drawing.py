@@ -1,7 +1,6 @@
 """Result figures of the paper: curves with error bars, named at their ends."""
 
 from collections.abc import Collection, Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
@@ -15,12 +14,20 @@ from scipy.optimize import isotonic_regression
 
 from swarm_mj.evaluation.figures.curves import Curve, NoPointsError, curves, method_of, results_of
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, look_of, styled, write_caption
-from swarm_mj.evaluation.published import Panel, ResultFigure
+from swarm_mj.evaluation.published import MissionField, Panel, ResultFigure
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
 
-TOP_IN, PANEL_IN, GAP_IN, BOTTOM_IN = 0.86, 3.3, 0.35, 0.75
-LEFT, RIGHT, MARGIN = 0.085, 0.8, 0.985  # of the width; the curves' names stand on the right
-FIXED = {
+# Heights, from the top: the head, each panel, what is between two, and the x axis with the caption.
+TOP_IN = 0.86
+PANEL_IN = 3.3
+GAP_IN = 0.35
+BOTTOM_IN = 0.75
+# Of the width: where panels begin and end, and where the curves' names do, to the right of them.
+LEFT = 0.085
+RIGHT = 0.8
+MARGIN = 0.985
+# How the head says what is fixed in a figure.
+FIXED: dict[MissionField, str] = {
     "num_robots": "{} robots",
     "range_ratio": "range ratio {:g}",
     "velocity_ratio": "velocity ratio {:g}",
@@ -31,22 +38,38 @@ PLAIN = "{x:g}"  # a number on an axis
 LINE_IN = 0.165  # from one name to the next
 MORE = "+"  # after the names of methods whose packets carry more than T, M and P
 PLACE = 1.045  # of the axes' width
-# From a name to the end of its curve.
-ARROW = {"arrowstyle": "-", "linewidth": 0.6, "shrinkA": 1.0, "shrinkB": 4.0, "relpos": (0.0, 0.5)}
 ASIDE = 0.02  # likewise, from the end of a curve that ends early to its name
 PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
 def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[str] = ()) -> Figure:
-    """Draw our curves and the published ones, of these methods or all; raise as `results_of`."""
+    """Draw our curves and the published ones.
+
+    Args:
+        figure: One of the paper's, such as `RESULT_FIGURES["fig4"]`.
+        results: Rows of result files; those of other missions than the figure's are passed over.
+        methods: The policies and published methods to draw; empty for all.
+
+    Returns:
+        The figure, which `style.save` writes.
+
+    Raises:
+        NoPointsError: None of the results, or of the methods, belongs to the figure.
+        ValueError: Some results are not comparable, as they differ in more than the figure's x.
+    """
     found = results_of(figure, results)
     if methods:
-        found = [result for result in found if method_of(result) in methods] or found[:1]
-    costs = [curves(figure, panel.cost, found) for panel in figure.panels]
-    if methods:
-        costs = [[curve for curve in of if curve.method in methods] for of in costs]
-        if not all(costs):
-            raise NoPointsError(f"{figure.name} has no points of {', '.join(methods)}")
+        chosen = [result for result in found if method_of(result) in methods]
+        # The caption names results, also where all curves are published ones.
+        found = chosen or found[:1]
+    costs = []
+    for panel in figure.panels:
+        shown = curves(figure, panel.cost, found)
+        if methods:
+            shown = [curve for curve in shown if curve.method in methods]
+            if not shown:
+                raise NoPointsError(f"{figure.name} has no points of {', '.join(methods)}")
+        costs.append(shown)
     return draw_curves(figure, found, costs)
 
 
@@ -88,8 +111,10 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
         f"to {last}, {result.num_windows} windows each; {made_by}"
     ]
     budgets = [config_of(each).get("decisions") for each in results]
-    if decisions := [budget for budget in budgets if budget]:
-        least, most = f"{min(decisions):,}", f"{max(decisions):,}"
+    decisions = [budget for budget in budgets if budget]
+    if decisions:  # some were trained
+        least = f"{min(decisions):,}"
+        most = f"{max(decisions):,}"
         numbers = most if least == most else f"{least} to {most}"
         lines.append(f"our GNNs: trained on {numbers} {PAPERS_BUDGET}")
     if any(each.policy != method_of(each) for each in results):
@@ -150,12 +175,10 @@ def _head(
     line = 1.0 - 0.28 / height_in
     drawing.text(LEFT, line, figure.title, fontsize=12, fontweight="bold", va="baseline")
     drawing.text(MARGIN, line, regime, color=FAINT, va="baseline", ha="right")
-    mark: dict[str, Any] = {"color": FAINT, "marker": "o"}
-    ring: dict[str, Any] = {"linestyle": "--", "linewidth": 1.2, "markerfacecolor": "white"}
-    handles = {
-        "this package, mean ± SEM": Line2D([], [], markersize=4.5, **mark),
-        "published, mean ± SEM": Line2D([], [], markersize=4.5 * RING, **mark, **ring),
-    }
+    ours = Line2D([], [], color=FAINT, marker="o", markersize=4.5)
+    theirs = Line2D([], [], color=FAINT, marker="o", markersize=4.5 * RING)
+    theirs.set(linestyle="--", linewidth=1.2, markerfacecolor="white")
+    handles = {"this package, mean ± SEM": ours, "published, mean ± SEM": theirs}
     if any(map(carries_more, results)):
         handles[f"{MORE}: packets {CARRIES_MORE}"] = Line2D([], [], linestyle="")
     drawing.legend(
@@ -193,8 +216,16 @@ def name_ends(axes: Axes, shown: Sequence[Curve]) -> None:
 
 def _name(axes: Axes, curve: Curve, end: tuple[float, float], place: tuple[float, float]) -> None:
     look = look_of(curve.method)
-    line: dict[str, Any] = {"color": look.colour}
-    line["linestyle"] = "--" if curve.is_published else "-"
+    # A line from the name's left edge to the end of its curve.
+    arrow = {
+        "arrowstyle": "-",
+        "color": look.colour,
+        "linestyle": "--" if curve.is_published else "-",
+        "linewidth": 0.6,
+        "shrinkA": 1.0,
+        "shrinkB": 4.0,
+        "relpos": (0.0, 0.5),
+    }
     axes.annotate(
         name_of(curve),
         xy=end,
@@ -206,7 +237,7 @@ def _name(axes: Axes, curve: Curve, end: tuple[float, float], place: tuple[float
         va="center",
         annotation_clip=False,
         path_effects=[withStroke(linewidth=2.5, foreground="white")],  # over other curves
-        arrowprops=line | ARROW,
+        arrowprops=arrow,
     )
 
 

@@ -20,9 +20,22 @@ ARROW_SHARE = 0.13  # of a panel's width: the length of its longest arrow
 
 
 def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
-    """Draw a flock's start and end; ValueError for an unknown policy or a bad seed (Fig. 2)."""
+    """Draw a flock's start and end, by the velocities of its robots (Fig. 2).
+
+    Args:
+        preset: `paper` or `reference`.
+        policy_name: Who talks to whom.
+        seed: Of the mission, which is flown to its end.
+
+    Returns:
+        The figure, which `style.save` writes.
+
+    Raises:
+        ValueError: There is no such policy, or the seed is not one.
+    """
     mission = PAPERS[preset]("flocking")
-    policy, swarm = make_policy(policy_name, mission), Swarm(mission, [seed])
+    policy = make_policy(policy_name, mission)
+    swarm = Swarm(mission, [seed])
     start = swarm.states
     for _ in rollout(swarm, policy):
         pass
@@ -46,10 +59,12 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
 
 def _draw(axes: Axes, mission: Mission, time_s: float, team: RobotStates) -> Quiver:
     """Draw one moment; each panel has its own scale of arrows, shown by its key."""
-    corner_m, side_m = -mission.half_side_m, mission.side_m
+    corner_m = -mission.half_side_m
+    side_m = mission.side_m
     area = Rectangle((corner_m, corner_m), side_m, side_m, fill=False, color=FAINT, linestyle=":")
     axes.add_patch(area)
-    (x_m, y_m), velocity_mps = team.position_m[0].T, team.velocity_mps[0]
+    x_m, y_m = team.position_m[0].T
+    velocity_mps = team.velocity_mps[0]
     apart_mps = np.linalg.norm(velocity_mps - np.mean(velocity_mps, axis=0), axis=1)
     axes.scatter(x_m, y_m, s=9.0, color=FAINT)
     fastest_mps = np.max(np.linalg.norm(velocity_mps, axis=1))

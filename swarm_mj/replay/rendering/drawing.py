@@ -21,10 +21,11 @@ NUM_SHADES = 48
 SHORTFALL = "missing to decode"  # the meaning of the numbers next to robots
 TAG = 2  # of dark ground around a number [pixels]
 LABELS_FIRST = 1000  # a number covers up to this many robots rather than another number
-# In sizes of the text: texts that matter less or more, and a legend's samples, all of them and from
-# one to the next.
-SMALL, LARGE = 0.8, 1.3
-ROOM, STEP = 3.7, 1.1
+# In sizes of the text.
+SMALL = 0.8  # texts that matter less
+LARGE = 1.3  # and more
+ROOM = 3.7  # of all samples of a legend
+STEP = 1.1  # from one to the next
 
 Font: TypeAlias = ImageFont.FreeTypeFont | ImageFont.ImageFont
 
@@ -48,20 +49,28 @@ def draw_title(
     draw: ImageDraw, footage: Footage, row: int, box: Box, size: int, curve: Colour
 ) -> None:
     """Draw policy, mission, own parts and time above a scene, and its age in its curve's colour."""
-    facts, now = footage.facts, footage.window[row]
-    mission, small, large = facts.mission, font(SMALL * size), font(LARGE * size)
-    left, right, top = box.left + size // 2, box.right - size // 2, box.top + size // 2
+    facts = footage.facts
+    mission = facts.mission
+    now = footage.window[row]
+    small = font(SMALL * size)
+    large = font(LARGE * size)
+    left = box.left + size // 2
+    right = box.right - size // 2
+    top = box.top + size // 2
     draw.text((left, top), facts.policy, palette.TEXT, large)
     draw.text((right, top), f"age {footage.age_mean[row]:.1f} windows", curve, large, anchor="ra")
     below = top + 1.7 * size
     what = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
-    where = ", ".join(where_flown(mission)).split(", ")
-    about = "\n".join([what, *filter(None, where), *facts.own_parts])
-    draw.text((left, below), about, palette.SENT, small)
+    lines = [what]
+    # A line for each thing that is said of where it was flown, for a title is narrow.
+    lines += [each for each in ", ".join(where_flown(mission)).split(", ") if each]
+    lines += facts.own_parts
+    draw.text((left, below), "\n".join(lines), palette.SENT, small)
     time = f"{now * mission.window_s:.1f} s, window {now}"
     draw.text((right, below), time, palette.SENT, small, anchor="ra")
-    if (num := int(np.sum(footage.is_cut_off[row]))) > 0:
-        text = f"{num} cut off from r{footage.ego}"
+    num_cut_off = int(np.sum(footage.is_cut_off[row]))
+    if num_cut_off > 0:
+        text = f"{num_cut_off} cut off from r{footage.ego}"
         draw.text((right, below + size), text, palette.TOO_WEAK, small, anchor="ra")
 
 
@@ -72,7 +81,8 @@ def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: in
     full_scale = footages[0].facts.full_scale
     text = f"colour: age of what {observers} (white) knows"
     draw.text((box.left, box.top), text, palette.TEXT, small)
-    y, high = box.top + 1.25 * size, 0.55 * size
+    y = box.top + 1.25 * size
+    high = 0.55 * size
     edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
     ages = np.linspace(0.0, full_scale, NUM_SHADES)
     for k, colour in enumerate(palette.age_colours(ages, full_scale).tolist()):
@@ -138,11 +148,13 @@ def draw_shortfalls(
     size: int,
 ) -> None:
     """Write by how much links are too weak, next to the `others` at their far ends [pixels]."""
-    small, shown = font(0.75 * size), np.zeros((0, 2, 2))
+    small = font(0.75 * size)
+    shown = np.zeros((0, 2, 2))  # the numbers so far: their boxes' corners
     on_robots = np.stack([robots - 0.4 * size, robots + 0.4 * size], axis=1)
     for robot, margin in zip(others.tolist(), margin_db.tolist(), strict=True):
         text = f"{margin} dB"
-        width, high = draw.textlength(text, small) + 2 * TAG, 0.95 * size
+        width = draw.textlength(text, small) + 2 * TAG
+        high = 0.95 * size
         # To the right, to the left, below or above: where it covers least.
         sides = [(0.7, -0.5), (-0.7 - width / size, -0.5), (-0.5, 0.8), (-0.5, -1.8)]
         low = robots[robot] + size * np.array(sides)
@@ -176,9 +188,16 @@ class AgePlot:
 
     def __init__(self, footages: Sequence[Footage], box: Box, size: int) -> None:
         """Prepare the curves, as points of the picture."""
-        self._footages, self._box, self._size = footages, box, size
-        left, top = box.left + 2 * size, round(box.top + 1.4 * size)
-        self._inner = inner = Box(left, top, box.right, box.bottom - size)
+        self._footages = footages
+        self._box = box
+        self._size = size
+        inner = Box(
+            left=box.left + 2 * size,
+            top=round(box.top + 1.4 * size),
+            right=box.right,
+            bottom=box.bottom - size,
+        )
+        self._inner = inner
         seconds = [each.window * each.facts.mission.window_s for each in footages]
         self._end_s = max(float(each[-1]) for each in seconds)
         self._top = palette.nice_top(max(float(np.max(each.age_mean)) for each in footages))
@@ -190,13 +209,16 @@ class AgePlot:
 
     def draw_axes(self, draw: ImageDraw) -> None:
         """Draw what does not change: title, numbers, and the whole curves, faintly."""
-        small, inner, footages = font(SMALL * self._size), self._inner, self._footages
+        small = font(SMALL * self._size)
+        inner = self._inner
+        footages = self._footages
         title = "mean age of information [windows]"
         draw.rectangle(inner, palette.GRID)
         # Two missions' columns would look alike.
         if len(footages) == 1 and np.any(footages[0].is_cut_off):
             title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
-            left, shares = float(inner.left), footages[0].cut_off_share.tolist()
+            left = float(inner.left)
+            shares = footages[0].cut_off_share.tolist()
             for (right, _), part in zip(self._curves[0], shares, strict=True):
                 if part > 0.0:
                     top = inner.bottom - part * (inner.bottom - inner.top)
@@ -214,7 +236,8 @@ class AgePlot:
 
     def draw_until(self, draw: ImageDraw, rows: Sequence[int]) -> None:
         """Draw the curves so far, and where they are now."""
-        radius, width = max(2.0, self._size / 5), max(2, self._size // 8)
+        radius = max(2.0, self._size / 5)
+        width = max(2, self._size // 8)
         for curve, colour, row in zip(self._curves, palette.FILM_CURVES, rows, strict=False):
             if row > 0:
                 draw.line(curve[: row + 1], colour, width, joint="curve")

@@ -17,19 +17,23 @@ Shade: TypeAlias = np.ndarray | palette.Colour
 
 # The camera above the ground, by the picture's height over its width: flat in wide pictures and
 # steep in high ones, so that the square fills them. 90 would look straight down.
-SHAPES, ELEVATIONS_DEG = (0.5, 1.0), (45.0, 68.0)
+SHAPES = (0.5, 1.0)
+ELEVATIONS_DEG = (45.0, 68.0)
 FOV_Y_DEG = 32.0  # a long lens: what is near is hardly larger than what is far
-SHIFTS = 0.21, -0.05  # of what it looks at, from the square's centre south, by half the side
+SHIFTS = (0.21, -0.05)  # of what it looks at, from the square's centre south, by half the side
 MARGIN = 0.94  # of the picture, for the square
 TAN = float(np.tan(np.deg2rad(FOV_Y_DEG / 2.0)))
 
 # Sizes on the picture, of its height, whatever the size of the area.
-ROBOT, OBSERVER = 0.0085, 0.0115  # radii
-HEADING, LINE = 0.022, 0.0025  # a length and a width
+ROBOT = 0.0085  # a radius
+OBSERVER = 0.0115  # likewise
+HEADING = 0.022  # a length
+LINE = 0.0025  # a width
 SMALLEST = 520  # [pixels] in height: robots are not drawn smaller than on such a picture
 ROBOT_HEIGHT = 0.6  # of a marker, by its radius
 DISC = mjtGeom.mjGEOM_CYLINDER
-NO_TURN, NOWHERE = np.eye(3).ravel(), np.zeros(3)
+NO_TURN = np.eye(3).ravel()
+NOWHERE = np.zeros(3)
 HALO_HEIGHT = 0.15  # around a robot that is cut off, by its radius
 LINES_PER_ROBOT = 40  # mismatched links; of very dense teams, some are left out
 # A disc, a heading, a halo, arcs of all that a window can have, and lines.
@@ -63,14 +67,18 @@ class Camera(NamedTuple):
     def axes(self, point_m: Float[np.ndarray, "K 3"]) -> Float[np.ndarray, "3 K"]:
         """Return points along the picture's axes from the target: right, up and ahead [m]."""
         x, y, z = point_m.T
-        sin, cos = (of(np.deg2rad(self.elevation_deg)) for of in (np.sin, np.cos))
+        elevation = np.deg2rad(self.elevation_deg)
+        sin = np.sin(elevation)
+        cos = np.cos(elevation)
         return np.stack([x, sin * y + cos * z, cos * y - sin * z])
 
     def aim(self, free: MjvCamera) -> None:
         """Let a camera of MuJoCo's see the same."""
         free.type = mjtCamera.mjCAMERA_FREE.value
         free.lookat[:] = (*self.target_m, 0.0)
-        free.distance, free.azimuth, free.elevation = self.distance_m, 90.0, -self.elevation_deg
+        free.distance = self.distance_m
+        free.azimuth = 90.0
+        free.elevation = -self.elevation_deg
 
 
 def look_at(ground: Ground, row: int, width: int, height: int) -> Camera:
@@ -92,10 +100,10 @@ def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) ->
     line_pixels = LINE * max(camera.height, SMALLEST)
     _draw_robots(scene, footage, row, picture_m, line_pixels)
     for fate, packets in footage.packets_at(row).items():
-        colour, share = palette.PACKETS[fate]
-        for points in arcs(packets, ROBOT * picture_m, share):
+        style = palette.PACKETS[fate]
+        for points in arcs(packets, ROBOT * picture_m, style.share):
             for start, end in itertools.pairwise(points):
-                _add_line(scene, start, end, colour, line_pixels)
+                _add_line(scene, start, end, style.colour, line_pixels)
     # Last, for of very dense teams there is no room for all; robots and packets go first.
     room = scene.maxgeom - scene.ngeom
     lines_m, colours = footage.mismatch_lines(row)
@@ -107,7 +115,8 @@ def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) ->
 def _draw_robots(
     scene: MjvScene, footage: Footage, row: int, picture_m: float, line_pixels: float
 ) -> None:
-    velocity_mps, colours = footage.velocity_mps[row], footage.colours[row]
+    velocity_mps = footage.velocity_mps[row]
+    colours = footage.colours[row]
     speed = np.linalg.norm(velocity_mps, axis=1, keepdims=True)
     way_m = HEADING * picture_m * velocity_mps / np.maximum(speed, 1e-9)
     for i, (where, way) in enumerate(zip(footage.position_m[row], way_m, strict=True)):
@@ -116,11 +125,13 @@ def _draw_robots(
         size_m = np.array([radius_m, radius_m, 0.0])
         _add(scene, DISC, colours[i], size_m, np.append(where, height_m))
         if footage.is_cut_off[row, i]:
-            flat_m, wide_m = HALO_HEIGHT * radius_m, palette.HALO * radius_m
+            flat_m = HALO_HEIGHT * radius_m
+            wide_m = palette.HALO * radius_m
             size_m = np.array([wide_m, flat_m, 0.0])
             _add(scene, DISC, palette.CUT_OFF, size_m, np.append(where, flat_m))
         if np.any(way):
-            start, end = np.append(where, height_m), np.append(where + way, height_m)
+            start = np.append(where, height_m)
+            end = np.append(where + way, height_m)
             _add_line(scene, start, end, palette.HEADING, line_pixels)
 
 
@@ -135,6 +146,7 @@ def _add(
     scene: MjvScene, kind: mjtGeom, colour: Shade, size: np.ndarray, where: np.ndarray
 ) -> MjvGeom:
     scene.ngeom += 1
-    geom, rgba = scene.geoms[scene.ngeom - 1], np.append(np.asarray(colour) / 255.0, 1.0)
+    geom = scene.geoms[scene.ngeom - 1]
+    rgba = np.append(np.asarray(colour) / 255.0, 1.0)
     mjv_initGeom(geom, kind.value, size, where, NO_TURN, rgba.astype(np.float32))
     return geom

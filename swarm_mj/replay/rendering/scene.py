@@ -25,10 +25,13 @@ BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small
 TILE_M = 200.0  # the floor's texture, two squares by two, assets/arena.xml
 GROUND = 10.0  # an open floor's side, by the area's: a team that flies apart has left the area
 # What faces up has its own colour exactly, what stands upright half of it.
-AMBIENT, SUN = 0.5, 0.5
-WALL_OPACITY, OBSTACLE_OPACITY = 0.3, 0.35  # what stands in front hides no robot
-SLICES, STACKS = 14, 5  # of round things
-WINDOW = 1280, 720  # that sizes on the window are meant for [pixels]
+AMBIENT = 0.5
+SUN = 0.5
+WALL_OPACITY = 0.3  # what stands in front hides no robot
+OBSTACLE_OPACITY = 0.35  # likewise
+SLICES = 14  # of round things, around
+STACKS = 5  # and along their axis
+WINDOW = (1280, 720)  # that sizes on the window are meant for [pixels]
 NO_WINDOW = 'the window needs a display; without one, render_mode="rgb_array" draws pictures'
 CLOSING_S = 5.0  # what the window may take to close
 
@@ -45,7 +48,8 @@ class SceneRenderer(ExitStack):
     ) -> None:
         """Compile the scene for pictures of this size [pixels]; OSError if no OpenGL works here."""
         super().__init__()
-        self._size, self._mission = (width, height), mission
+        self._size = (width, height)
+        self._mission = mission
         self._model = pictured(mission, scene, width, height)
         self._data = MjData(self._model)
         self._floor = functions.mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
@@ -72,17 +76,18 @@ class SceneRenderer(ExitStack):
 
     def frame(self, footage: Footage, row: int = 0) -> UInt8[np.ndarray, "H W 3"]:
         """Return the picture of a window, counted from 0: RGB, its first row on top."""
-        (width, height), data = self._size, self._data
+        width, height = self._size
+        data = self._data
         data.qpos[:] = footage.position_m[row].ravel()
         functions.mj_kinematics(self._model, data)
         functions.mj_comPos(self._model, data)
         functions.mj_camlight(self._model, data)
         if not self._mission.has_walls and self._floor >= 0:
             # By whole tiles, so that the pattern stands still under a team that flies on.
-            data.geom_xpos[self._floor, :2] = TILE_M * np.round(
-                footage.ground.centre_m[row] / TILE_M
-            )
-        camera, free = self.camera(footage, row), MjvCamera()
+            tiles = np.round(footage.ground.centre_m[row] / TILE_M)
+            data.geom_xpos[self._floor, :2] = TILE_M * tiles
+        camera = self.camera(footage, row)
+        free = MjvCamera()
         camera.aim(free)
         kinds = mjtCatBit.mjCAT_ALL.value
         functions.mjv_updateScene(self._model, data, self._options, None, free, kinds, self._scene)
@@ -120,11 +125,15 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
             geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
     model = spec.compile()
     visual = model.vis
-    visual.global_.offwidth, visual.global_.offheight = width, height
+    visual.global_.offwidth = width
+    visual.global_.offheight = height
     visual.global_.fovy = markers.FOV_Y_DEG
-    visual.quality.numslices, visual.quality.numstacks = SLICES, STACKS
-    visual.headlight.ambient[:], visual.headlight.diffuse[:] = AMBIENT, 0.0
-    model.light_diffuse[:], model.light_ambient[:] = SUN, 0.0
+    visual.quality.numslices = SLICES
+    visual.quality.numstacks = STACKS
+    visual.headlight.ambient[:] = AMBIENT
+    visual.headlight.diffuse[:] = 0.0
+    model.light_diffuse[:] = SUN
+    model.light_ambient[:] = 0.0
     model.light_dir[:] = (0.0, 0.0, -1.0)
     for g in obstacle_geoms(model):
         material = model.geom_matid[g]

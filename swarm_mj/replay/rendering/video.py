@@ -21,7 +21,7 @@ from swarm_mj.replay.view import DEFAULTS, GIF, VideoStyle, fitted
 
 Picture = UInt8[np.ndarray, "H W 3"]
 
-STRIPS = 0.22, 0.28  # of the height, below one scene, and below two, which are narrow
+STRIPS = (0.22, 0.28)  # of the height, below one scene, and below two, which are narrow
 TEXT = 0.028  # of the height, or of the width of a narrow scene
 SEAM = 4  # between scenes [pixels]
 LEGEND = 0.32  # of the width; the plot has the rest
@@ -41,13 +41,16 @@ class Movie(ExitStack):
         # One scale for both: by it the fresher team is seen in full, and the other is older still.
         scale = min(each.facts.full_scale for each in footages)
         self._footages = [replace(x, facts=replace(x.facts, full_scale=scale)) for x in footages]
-        self._num_frames, width, height = style.num_frames, style.width, style.height
+        self._num_frames = style.num_frames
+        width = style.width
+        height = style.height
         bottom = height - round(STRIPS[len(footages) - 1] * height)
         edges = np.linspace(0, width, len(footages) + 1).round().astype(int).tolist()
         self._boxes = [drawing.Box(a, 0, b, bottom) for a, b in itertools.pairwise(edges)]
         self._text = max(9, round(min(TEXT * height, 0.05 * self._boxes[0].right)))
         pad = self._text // 2
-        middle, top = pad + round(LEGEND * width), bottom + pad
+        middle = pad + round(LEGEND * width)
+        top = bottom + pad
         legend = drawing.Box(pad, top, middle - 2 * pad, height - pad)
         right = drawing.Box(middle, top, width - 2 * pad, height - pad)
         self._plot = drawing.AgePlot(footages, right, self._text)
@@ -56,12 +59,11 @@ class Movie(ExitStack):
         drawing.draw_legend(draw, self._footages, legend, self._text)
         self._plot.draw_axes(draw)
         with ExitStack() as opened:  # closes the first renderer if the second does not start
-            self._renderers = [
-                opened.enter_context(
-                    SceneRenderer(each.facts.mission, right - left, bottom, scene=each.scene)
-                )
-                for each, (left, _, right, _) in zip(footages, self._boxes, strict=True)
-            ]
+            self._renderers: list[SceneRenderer] = []
+            for each, box in zip(footages, self._boxes, strict=True):
+                width = box.right - box.left
+                renderer = SceneRenderer(each.facts.mission, width, bottom, scene=each.scene)
+                self._renderers.append(opened.enter_context(renderer))
             self.push(opened.pop_all())
 
     def __iter__(self) -> Iterator[Picture]:
@@ -96,8 +98,25 @@ def make_video(
 ) -> bytes:
     """Return the file of a video of one mission, or of two side by side.
 
-    Footages are logs, or from `read_footage`; `on_picture` is called after each picture.
-    Raise ValueError for more missions or another suffix, and OSError if no OpenGL works here.
+    Args:
+        footages: One or two logs, such as a `Run`'s, or what `read_footage` reads of replays.
+        suffix: `.mp4` or `.gif`.
+        style: Size, length and pictures per second; None is 1280 by 720 pixels in 10 seconds.
+        on_picture: Called after each picture.
+
+    Returns:
+        The file's content.
+
+    Raises:
+        ValueError: There are more missions, or the suffix is another.
+        OSError: No OpenGL works here; the message says what to install.
+
+    Example:
+        ```python
+        runs = [swarm_mj.fly("flocking", policy=name) for name in ("planner", "tdma")]
+        content = make_video([run.footage() for run in runs])
+        Path("both.mp4").write_bytes(content)
+        ```
     """
     if suffix not in DEFAULTS:
         raise ValueError(f"a video is {' or '.join(DEFAULTS)}, not {suffix}")
@@ -111,9 +130,11 @@ def make_video(
 
         if suffix != GIF:
             return encode_mp4(pictures(), style)
-        shares = np.linspace(0.0, 1.0, SAMPLES)
-        rows = ([round(share * (len(each.window) - 1)) for each in footages] for share in shares)
-        return encode_gif(pictures(), style, [movie.picture(each) for each in rows])
+        samples = []
+        for share in np.linspace(0.0, 1.0, SAMPLES):
+            rows = [round(share * (len(each.window) - 1)) for each in footages]
+            samples.append(movie.picture(rows))
+        return encode_gif(pictures(), style, samples)
 
 
 def encode_mp4(pictures: Iterable[Picture], style: VideoStyle) -> bytes:
