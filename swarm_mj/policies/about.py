@@ -1,4 +1,4 @@
-"""What a policy says of itself, declared once, on its class.
+"""A policy's description of itself, declared once, on its class.
 
 Lists, tables, figures, the check of memory and `make_policy` read it there. A policy of yours may
 declare an `About`; a policy of the package declares a `Listed`, from which `POLICIES` is made.
@@ -100,18 +100,18 @@ class Information(Enum):
 
     @property
     def label(self) -> str:
-        """What tables call it."""
+        """The words that tables have for it."""
         return self.value.label
 
     @property
     def sentence(self) -> str:
-        """What it is."""
+        """A sentence on what it is."""
         return self.value.sentence
 
 
 @dataclass(frozen=True, kw_only=True)
 class Payload:
-    """What packets carry beyond T, M and P (II-B); `Policy.payload_fields` says how wide it is."""
+    """The load of packets beyond T, M and P (II-B); `Policy.payload_fields` says how wide it is."""
 
     name: str  # in a word, as results have it
     meaning: str  # what it holds and what robots do with it, in a line without a full stop
@@ -172,7 +172,7 @@ FEW_BYTES = PairMemory(bytes_per_pair=0.0)  # so few that the mission's own tabl
 
 @dataclass(frozen=True, kw_only=True)
 class About:
-    """What a policy says of itself, as its class's attribute `about`; nothing may be left out.
+    """A policy's description of itself, its class's attribute `about`; nothing may be left out.
 
     It holds for the class that declares it, not for subclasses, which may decide by other things.
     The first line of the class's docstring is its summary in lists.
@@ -248,7 +248,7 @@ Origin = FromPaper | Textbook | Leading | VariantOf | Bound
 
 @dataclass(frozen=True, kw_only=True)
 class Listed(About):
-    """What a policy of the package says of itself: also its name, and why it is there.
+    """The description of a policy of the package: also its name, and why it is there.
 
     Args:
         name: On the command line and in results.

@@ -18,7 +18,6 @@ from swarm_mj.policies.about import (
     Payload,
     VariantOf,
 )
-from swarm_mj.policies.learned import MlpPolicy
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import WITH_LINKS, RestingPlanner
 from swarm_mj.policies.policy import BroadcastPolicy, Policy
@@ -155,7 +154,6 @@ def test_the_planner_at_rest_says_what_it_sends_there():
     planner = make_policy("planner", rest)
     assert (planner.about, planner.payload) == (WITH_LINKS, "links")
     assert WITH_LINKS.look == LISTED["planner"].look
-    assert (MlpPolicy.about, make_policy("gnn", rest).about) == (None, LISTED["gnn"])
 
 
 def test_a_users_own_policy_is_known_where_it_is_loaded(mine):

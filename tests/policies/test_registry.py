@@ -12,6 +12,7 @@ from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
 from swarm_mj.policies.registry import (
+    LISTED,
     POLICIES,
     flown_name,
     is_learned,
@@ -86,6 +87,8 @@ def test_the_shipped_policy_is_the_network_in_assets(tmp_path):
     assert is_learned("gnn")
     stored = make_policy(str(asset("policies/gnn.safetensors")), MISSION)
     assert shipped.parameters == stored.parameters
+    assert (shipped.about, stored.about) == (LISTED["gnn"], None)  # others see by other features
+    assert shipped.uses == LISTED["gnn"].uses
     assert shipped.parameters != make_policy("./gnn", MISSION).parameters
 
 
