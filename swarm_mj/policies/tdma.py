@@ -159,7 +159,7 @@ class SpatialTdma(Tdma):
                 news=self._news,
             )
             is_sending |= wins & ~knows_all
-            # Whoever sends tells all that it knows, so none of that is news of its any longer.
+            # A robot that sends tells all that it knows, so it has no news any longer.
             self._news[is_sending[:, :, None] & is_oneself] = 0.0
         return is_sending
 

@@ -19,7 +19,7 @@ from swarm_mj.radio.asynchronous import AsynchronousChannel
 
 
 class _Slot(NamedTuple):
-    """What was on the air in one slot."""
+    """The packets of one slot, and of those the punctual ones."""
 
     phase: Phase  # all packets that it began with, and all that were decoded in it
     punctual: Phase  # of both, those of robots whose packets arrive in their own slot

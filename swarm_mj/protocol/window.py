@@ -206,7 +206,7 @@ def channel_at(
 
 
 class PlayWindow(Protocol):
-    """What plays a window of Alg. 1 over a channel of its own; arguments as in `window`."""
+    """A way to play a window of Alg. 1 over a channel of its own; arguments as in `window`."""
 
     def __call__(
         self,
@@ -222,7 +222,7 @@ class PlayWindow(Protocol):
 
 
 class PlayBroadcast(Protocol):
-    """What plays a slot of broadcasts over a channel of its own; arguments as in `broadcast`."""
+    """A way to play a slot of broadcasts over a channel of its own; arguments as in `broadcast`."""
 
     def __call__(
         self,

@@ -147,7 +147,7 @@ def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.
     gained = np.zeros(num_columns, np.int64)
     for n in range(last + num_slots):
         s = n % num_slots
-        # Before the last frame, news makes all of that frame younger, whoever it is of. Within it,
+        # Before the last frame, news makes all of that frame younger, no matter of whom. Within it,
         # the slots that have passed are taken off what is added for the whole frame in the end.
         if n < last:
             value = each
