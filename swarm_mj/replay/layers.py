@@ -44,7 +44,7 @@ class View(Entity):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Layer(Entity):
+class ReplayLayer(Entity):
     """An entity whose things are drawn alike in every window."""
 
     colour: Colour | None  # None: each thing has its own
@@ -62,7 +62,7 @@ class Layer(Entity):
 
 
 @dataclass(frozen=True, kw_only=True)
-class FlatLayer(Layer):
+class FlatLayer(ReplayLayer):
     """A layer in 2-D, where what is drawn last covers the rest."""
 
     order: float  # the higher is drawn over the lower
@@ -137,7 +137,7 @@ class Points(FlatLayer):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Lines3D(Layer):
+class Lines3D(ReplayLayer):
     """Lines in 3-D."""
 
     def look(self, strips: Strips | None = None) -> rr.LineStrips3D:
@@ -151,7 +151,7 @@ class Lines3D(Layer):
 
 # What a map is made of.
 Flat: TypeAlias = Lines | Arrows | Rings | Points
-AnyLayer = TypeVar("AnyLayer", bound=Layer)
+AnyLayer = TypeVar("AnyLayer", bound=ReplayLayer)
 
 
 def of_others(layer: AnyLayer) -> AnyLayer:

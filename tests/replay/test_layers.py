@@ -7,7 +7,7 @@ from reading import entities
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay import layers
-from swarm_mj.replay.layers import Entity, FlatLayer, Layer, View, of_others
+from swarm_mj.replay.layers import Entity, FlatLayer, ReplayLayer, View, of_others
 from swarm_mj.replay.palette import PACKETS
 from swarm_mj.replay.write import write_replay
 
@@ -52,7 +52,7 @@ def found(written):
 
 def test_paths_are_layers_own_and_below_a_view():
     """Two names of one layer, as by its fate, are one."""
-    its = set(declared(Layer).values())
+    its = set(declared(ReplayLayer).values())
     paths = [layer.path for layer in its]
     assert len(set(paths)) == len(paths)
     views = tuple(f"{view.path}/" for view in declared(View).values())
@@ -60,7 +60,7 @@ def test_paths_are_layers_own_and_below_a_view():
 
 
 def test_every_layer_is_drawn_by_some_mission_and_nothing_else(found):
-    paths = {layer.path for layer in declared(Layer).values()}
+    paths = {layer.path for layer in declared(ReplayLayer).values()}
     # Links between others are drawn as the observer's.
     paths |= {
         of_others(each).path for each in (*layers.LINKS.values(), *layers.SCENE_LINKS.values())
@@ -96,7 +96,7 @@ def shown(path):
 def test_every_layer_is_laid_out(written):
     contents = {each for path in written for each in shown(path)}
     everything = tuple(each.removesuffix("**") for each in contents if each.endswith("/**"))
-    for name, layer in declared(Layer).items():
+    for name, layer in declared(ReplayLayer).items():
         assert layer.path.startswith(everything), name
     assert layers.AGES.path in contents
 
