@@ -3,6 +3,8 @@
 import json
 import math
 import re
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -155,3 +157,14 @@ def test_the_readme_says_what_packets_carry():
         has_payload = make_policy(row["policy"], MISSION).payload != "none"
         assert ("snapshots" in carried) == has_payload, row
         assert (carried == "nothing") != has_payload, row
+
+
+def test_the_list_is_printed_without_torch():
+    """Its import takes longer than all the rest."""
+    code = (
+        "import sys; from swarm_mj.cli import main; main(['policies']); "
+        "print('gnn is there', 'torch' in sys.modules)"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert "\ngnn " in done.stdout
+    assert done.stdout.endswith("gnn is there False\n")
