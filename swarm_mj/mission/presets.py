@@ -7,7 +7,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.mission.specification import NOTHING, OPEN, Mission, Task
-from swarm_mj.system.fields import about_of, as_typed
+from swarm_mj.system.fields import about_of, as_typed, check_value
 
 _NUMBERS = tomllib.loads(Path(__file__).with_suffix(".toml").read_text("utf-8"))
 OFF = ("free-space", "none", 0)  # of the channel's effects
@@ -231,9 +231,16 @@ def make_mission(
                 f"the preset {mission.preset}; leave it out"
             )
         return replace(mission, **given)
-    usual = Mission()
-    preset = usual.preset if preset is None else preset
-    task = {} if mission is None else {"task": mission}
-    # Refuses an unknown preset or task by the field's own message, before it is looked up.
-    replace(usual, preset=preset, task=task.get("task", given.get("task", usual.task)))
-    return PRESETS[preset](**task, **given)
+    if mission is not None:
+        if "task" in given:
+            # In Python's words: `mission` is where it was given first.
+            raise TypeError("a mission got multiple values for keyword argument 'task'")
+        given["task"] = mission
+    if preset is None:
+        preset = Mission().preset
+    # The fields' own messages refuse what is unknown, before it is looked up.
+    specs = Mission.__dataclass_fields__
+    check_value(specs["preset"], preset)
+    if "task" in given:
+        check_value(specs["task"], given["task"])
+    return PRESETS[preset](**given)
