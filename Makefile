@@ -11,7 +11,7 @@ SCALE ?= paper
 STUDIES ?=
 BUDGET ?= quick
 
-.PHONY: help setup setup-dev fly bench check test test-all test-engines attack reference lock audit format results figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check same test test-all test-engines attack reference lock audit format results figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -21,6 +21,7 @@ help:
 	@echo "make attack  run the fault tests for minutes, and count what held"
 	@echo "make reference  ask the network simulator ns-3 again (Linux on x86-64, with g++)"
 	@echo "make check   formatter, linter and type checker"
+	@echo "make same    prove that every flight and training is as before, to the last digit; ARGS='--against HEAD~1'"
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
 	@echo "make results fly every table and figure of the docs, at one commit: hours; SCALE=smoke takes minutes"
@@ -73,6 +74,9 @@ check: $(DEV)
 	$(BIN)/ruff format --check .
 	$(BIN)/ruff check .
 	$(BIN)/basedpyright
+
+same: setup
+	$(BIN)/python tools/same.py $(ARGS)
 
 # Tests of a module run in one process, which has its fixtures; both share numba's cache on disk.
 PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder
