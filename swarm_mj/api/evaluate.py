@@ -15,8 +15,9 @@ from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import listed, missions_memory
+from swarm_mj.policies.registry import listed
 from swarm_mj.simulation.components import Components
+from swarm_mj.simulation.memory import policy_memory
 from swarm_mj.system.fields import check_value
 from swarm_mj.system.needs import Needs, check_fits, memory_errors
 from swarm_mj.system.packages import need
@@ -237,7 +238,7 @@ def evaluate(
 def study_needs(study: Study, num_jobs: int) -> Needs:
     """Return the memory and disk of a study: a batch in each process, and the results of all."""
     batches = study.batches
-    largest = max(missions_memory(x.policy, x.mission, len(x.seeds)) for x in batches)
+    largest = max(policy_memory(x.policy, x.mission, len(x.seeds)) for x in batches)
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     under_way = min(num_jobs, len(batches)) * largest
     return Needs(

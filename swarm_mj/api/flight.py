@@ -22,9 +22,9 @@ from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observer
 from swarm_mj.simulation.components import Components
+from swarm_mj.simulation.memory import FLYING, LIBRARIES, policy_memory
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system import needs
 from swarm_mj.system.compiled import compiling
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -186,7 +186,7 @@ def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | N
 
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     """Return the memory and disk that a flight takes."""
-    memory = registry.missions_memory(policy, mission) + (needs.FLYING - needs.LIBRARIES)
+    memory = policy_memory(policy, mission) + (FLYING - LIBRARIES)
     if not is_recorded:
         return Needs(memory=memory)
     num = mission.num_windows

@@ -27,8 +27,9 @@ from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import channel_at
+from swarm_mj.simulation.memory import FLYING
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.needs import FLYING, check_fits, peak_memory
+from swarm_mj.system.needs import check_fits, peak_memory
 from swarm_mj.system.packages import commit, version
 from swarm_mj.system.processes import attempt
 

@@ -14,6 +14,7 @@ from swarm_mj.learning.selection import OTHER_FLIGHTS, Row, num_missions
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
+from swarm_mj.simulation.memory import LIBRARIES, TORCH, learned_memory
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.reading import read_document, read_file, read_rows
@@ -165,11 +166,11 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     size, rollout = max(training.robots), rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS
     num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
-    held_out = needs.missions_memory(size, num_flown, is_learned=True)
-    under_way = needs.missions_memory(size, training.missions, is_learned=True)
+    held_out = learned_memory(size, num_flown)
+    under_way = learned_memory(size, training.missions)
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
-    memory = held_out + (under_way - needs.LIBRARIES - needs.TORCH) + passes
+    memory = held_out + (under_way - LIBRARIES - TORCH) + passes
     file = WINDOW_BYTES * training.missions * size * first.num_windows + CHECKPOINT_BYTES
     if limits.replay_every is None:
         return needs.Needs(memory=memory, file=file)

@@ -5,7 +5,7 @@ from dataclasses import fields, replace
 from typing import Any
 
 from swarm_mj.mission.specification import OPEN, Mission, Task
-from swarm_mj.system.fields import about_of
+from swarm_mj.system.fields import about_of, check_value
 
 NEEDED = {  # the effect that a number counts with; a state of it, if only that
     spec.name: (switch.name, switch.state or None)
@@ -138,7 +138,7 @@ def _overridden(preset: Mission, overrides: dict[str, Any]) -> Mission:
     is_touching = not is_open or overrides.get("collide", preset.collide)
     usual: dict[str, Any] = {
         # The paper's flocks fly off freely; obstacles only make sense where robots stay.
-        "boundary": "none" if preset.task == "flocking" and is_open else "reflect",
+        "boundary": "none" if preset.flocks and is_open else "reflect",
         "physics": "contact" if is_touching else "exact",
     }
     return replace(preset, **(usual | overrides))
@@ -183,9 +183,16 @@ def make_mission(
                 f"the preset {mission.preset}; leave it out"
             )
         return replace(mission, **given)
-    usual = Mission()
-    preset = usual.preset if preset is None else preset
-    task = {} if mission is None else {"task": mission}
-    # Refuses an unknown preset or task by the field's own message, before it is looked up.
-    replace(usual, preset=preset, task=task.get("task", given.get("task", usual.task)))
-    return PRESETS[preset](**task, **given)
+    if mission is not None:
+        if "task" in given:
+            # In Python's words: `mission` is where it was given first.
+            raise TypeError("a mission got multiple values for keyword argument 'task'")
+        given["task"] = mission
+    if preset is None:
+        preset = Mission().preset
+    # The fields' own messages refuse what is unknown, before it is looked up.
+    specs = Mission.__dataclass_fields__
+    check_value(specs["preset"], preset)
+    if "task" in given:
+        check_value(specs["task"], given["task"])
+    return PRESETS[preset](**given)

@@ -23,10 +23,9 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Pol
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.system import needs
 from swarm_mj.system.fields import check_kind, did_you_mean, unwrapped
 from swarm_mj.system.packages import asset, need
-from swarm_mj.system.user_code import is_own, load, make
+from swarm_mj.system.user_code import is_own, make
 
 FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
 PAYLOADS = ("snapshots", "none")  # the planner's own, which at rest is links, or nothing
@@ -198,20 +197,6 @@ def about_of(name: str) -> About | None:
 def is_learned(name: str) -> bool:
     """Return whether a policy is a trained network: the shipped one, or a stored one."""
     return name == SHIPPED or is_stored(name)
-
-
-def missions_memory(name: str, mission: Mission, num_missions: int = 1) -> float:
-    """Return the memory of missions side by side that a policy flies [bytes].
-
-    What a policy takes itself counts if it says so. Raises ValueError if a user's own cannot be
-    imported.
-    """
-    if is_own_policy(name):
-        load("policy", name)
-    about = about_of(name)
-    policy_pair = 0.0 if about is None else about.memory.of(mission)
-    learned = is_learned(name)
-    return needs.missions_memory(mission.num_robots, num_missions, policy_pair, is_learned=learned)
 
 
 def is_own_policy(name: str) -> bool:

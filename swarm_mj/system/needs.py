@@ -1,7 +1,6 @@
-"""Memory and disk that a command needs, and what this machine has left of them.
+"""Whether what a command needs of memory and disk is left on this machine: asked at the door.
 
-The constants are peaks measured on Linux, with all tasks and policies. Tests compare estimates with
-peaks: those of flights of large teams should be right within 20 %, others within a factor of 2.
+What is needed, those know who fill it: `simulation.memory`, `replay.recorder`, `learning`.
 """
 
 import math
@@ -26,14 +25,6 @@ GROUPS = {
 FILES = ("inactive_file", "active_file", "slab_reclaimable")  # memory that a group can give back
 
 GB = 1e9
-LIBRARIES = 0.15 * GB  # compiling included
-FLYING = 0.055 * GB  # of these, what a single flight takes whose code is compiled already
-TORCH = 0.4 * GB  # with the code that trains
-ROBOT = 8.5e3  # in MuJoCo's model, however many missions there are [bytes]
-# Of a mission and each pair of its robots [bytes].
-PAIR = 57.0  # the tables of robots, costs and the radio
-LEARNED_PAIR = 450.0  # these, and the network's input
-HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
 # Address space that libraries reserve and never fill; most of it is rerun's, a sixth torch's.
 ADDRESSES = 4.2 * GB
 
@@ -67,19 +58,6 @@ def check_fits(
         if needed > free and not is_forced:
             lack = f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}"
             raise ValueError(f"{lack}; {way_out}{way_on}")
-
-
-def missions_memory(
-    num_robots: int, num_missions: int, policy_pair: float = 0.0, *, is_learned: bool
-) -> float:
-    """Return the memory of missions side by side: the robots' tables, and a network's input.
-
-    `policy_pair` is what another policy takes for each pair of robots itself [bytes].
-    """
-    pairs = num_missions * num_robots**2
-    if not is_learned:
-        return LIBRARIES + ROBOT * num_robots + (PAIR + policy_pair) * pairs
-    return LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * num_robots) * pairs
 
 
 def in_gb(size: int | float) -> str:

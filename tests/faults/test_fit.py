@@ -15,6 +15,7 @@ from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
+from swarm_mj.simulation.memory import TORCH
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system import needs
 
@@ -44,7 +45,7 @@ def test_estimates_are_near_the_peaks(forks, tmp_path, tries):
     assert done.returncode == 0, done.stderr
     for index, line in enumerate(lines):
         estimate, peak, file = json.loads((tmp_path / f"{index}.json").read_text())
-        estimate -= needs.TORCH if line[0] == "train" or "gnn" in line else 0.0
+        estimate -= TORCH if line[0] == "train" or "gnn" in line else 0.0
         assert peak / FACTOR < estimate < FACTOR * peak, line
         if "--record" in line:
             size = (tmp_path / line[-1]).stat().st_size

@@ -48,6 +48,7 @@ def test_a_mission_is_made_of_a_task_of_a_preset_or_of_another_mission():
         ((), {"preset": "urbann"}, "preset must be one of .* not 'urbann'; did you mean urban"),
         ((Mission(),), {"preset": "urban"}, "is given whole, from the preset paper; leave it out"),
         (("flocking",), {"task": "flocking"}, "multiple values for keyword argument 'task'"),
+        (("flok",), {}, "task must be one of .* not 'flok'; did you mean flocking"),
         ((), {"num_robot": 3}, "did you mean num_robots"),
         ((Mission(),), {"num_robot": 3}, "did you mean num_robots"),
     ],

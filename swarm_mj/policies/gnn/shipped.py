@@ -24,5 +24,5 @@ SHIPPED_GNN = Listed(
     ),
     payload=None,
     look=Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", marker_size=8.0),
-    memory=FEW_BYTES,  # beside what `needs.missions_memory` counts for every learned policy
+    memory=FEW_BYTES,  # beside what `simulation.memory` counts for every learned policy
 )

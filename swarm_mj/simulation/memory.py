@@ -1,0 +1,49 @@
+"""The memory that missions side by side take, so that a team too large is refused before it flies.
+
+The constants are peaks measured on Linux, with all tasks and policies. Tests compare estimates with
+peaks: those of flights of large teams should be right within 20 %, others within a factor of 2.
+"""
+
+from swarm_mj.mission import Mission
+from swarm_mj.policies.registry import about_of, is_learned, is_own_policy
+from swarm_mj.system.needs import GB
+from swarm_mj.system.user_code import load
+
+LIBRARIES = 0.15 * GB  # compiling included
+FLYING = 0.055 * GB  # of these, what a single flight takes whose code is compiled already
+TORCH = 0.4 * GB  # with the code that trains
+ROBOT = 8.5e3  # in MuJoCo's model, however many missions there are [bytes]
+# Of a mission and each pair of its robots [bytes].
+PAIR = 57.0  # the tables of robots, costs and the radio
+LEARNED_PAIR = 450.0  # these, and the network's input
+HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
+
+
+def policy_memory(policy: str, mission: Mission, num_missions: int = 1) -> float:
+    """Return the memory of missions side by side that a policy flies [bytes].
+
+    Args:
+        policy: A name that `make_policy` takes. What the policy takes itself counts if it says so.
+        mission: What all of them are.
+        num_missions: B.
+
+    Returns:
+        The process's memory, its libraries included [bytes].
+
+    Raises:
+        ValueError: A user's own policy cannot be imported.
+    """
+    if is_own_policy(policy):
+        load("policy", policy)
+    if is_learned(policy):
+        return learned_memory(mission.num_robots, num_missions)
+    about = about_of(policy)
+    own_pair = 0.0 if about is None else about.memory.of(mission)
+    pairs = num_missions * mission.num_robots**2
+    return LIBRARIES + ROBOT * mission.num_robots + (PAIR + own_pair) * pairs
+
+
+def learned_memory(num_robots: int, num_missions: int) -> float:
+    """Return the memory of missions of N robots that a network flies, with its input [bytes]."""
+    pairs = num_missions * num_robots**2
+    return LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * num_robots) * pairs
