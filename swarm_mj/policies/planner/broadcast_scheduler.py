@@ -114,6 +114,7 @@ def _schedule(
     best = NOBODY
     most_known = -np.inf
     num_tried = 0
+    # In a slot that is not free nobody transmits, so there is nothing to try.
     if problem.width > 1 and is_free[0]:
         num_tried = problem.width
     for _ in range(num_tried):

@@ -254,7 +254,11 @@ def test_the_share_of_a_team_by_hand():
     apart = math.dist([30.0, 40.0], [50.0, 0.0])
     relative_std = (0.1 + 0.1 + math.sqrt(32.0) / apart) / 3
     share = 0.95 - 0.3 * 1.0 + 1.5 * relative_std + 0.1
-    assert weighed(links, replace(WEIGHING, share_per_std=1.5)).min_share == pytest.approx(share)
+    small = replace(WEIGHING, share_per_std=1.5)
+    assert weighed(links, small).min_share == pytest.approx(share)
+    # However doubtful the links are, the share stays below its maximum.
+    assert weighed(links, replace(small, max_share=share - 0.1)).min_share == share - 0.1
+    assert weighed(links, replace(small, share_per_std=50.0)).min_share == WEIGHING.max_share
 
 
 @pytest.mark.parametrize("num_robots", [1, 3])

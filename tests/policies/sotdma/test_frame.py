@@ -129,6 +129,23 @@ EVERYONE = np.ones(NUM_ROBOTS, dtype=bool)
 NO_MARKS = np.zeros((NUM_SLOTS, NUM_ROBOTS), dtype=bool)
 
 
+@pytest.mark.parametrize("spare", [5e-9, -5e-9])
+def test_between_equals_rounding_decides_and_ones_own_slot_still_needs_no_gain(spare):
+    """The gain from the worst slot to the best is all but exactly the least that a move must bring:
+    within what counts as equal, so that the sums by robots decide."""
+    _, power = team(2)
+    slots = np.random.default_rng(2).integers(0, NUM_SLOTS, NUM_ROBOTS)
+    slots[4] = NOWHERE
+    ages = [
+        aged(frame_of(power, np.where(np.arange(NUM_ROBOTS) == 4, slot, slots)).heard)
+        for slot in range(NUM_SLOTS)
+    ]
+    worst, youngest = int(np.argmax(ages)), int(np.argmin(ages))
+    min_gain = ages[worst] - ages[youngest] + spare
+    expected = worst if spare > 0.0 else youngest
+    assert best_slot(frame_of(power, slots), 4, worst, min_gain, NO_MARKS) == expected
+
+
 def best(power, slots, k, own, min_gain=RULE.min_gain, is_marked=NO_MARKS):
     """The best slot of k beside those who have one."""
     others = np.where(np.arange(NUM_ROBOTS) == k, NOWHERE, slots)
