@@ -39,12 +39,12 @@ MAX_REPLICAS = 10_000  # of a <replicate>; more would be compiled for minutes
 NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
 DEFAULT_LOSS_DB = 10.0  # of obstacles in a file that neither say their loss nor name a material
 
-MATERIALS: dict[str, "Material"] = {}  # by name; whoever makes one enters it here
+MATERIALS: dict[str, "Material"] = {}  # by name; making one enters it here
 
 
 @dataclass(frozen=True, kw_only=True)
 class Material:
-    """What obstacles are made of; geoms, those of a file too, name it."""
+    """A material of obstacles; geoms, those of a file too, name it."""
 
     name: str
     loss_db: float  # per obstacle crossed [dB]

@@ -17,7 +17,7 @@ from swarm_mj.system.packages import asset
 
 @runtime_checkable
 class Scene(Protocol):
-    """What changes the arena before it is compiled: any function of these two arguments.
+    """A change of the arena before it is compiled: any function of these two arguments.
 
     Example:
         >>> import mujoco
