@@ -9,6 +9,7 @@ from typing import get_args
 import numpy as np
 import pytest
 from channel_fields import CHANNEL_FIELDS, counting, other_values
+from declared import where_class, where_field
 from walls import walls
 
 from swarm_mj.mission import Mission, paper
@@ -81,8 +82,10 @@ READERS = RADIO | {
 def test_every_number_of_the_channel_is_read_once():
     """A new field that no radio reads would change nothing, in silence."""
     count = Counter(name for readers in READERS.values() for name in readers)
-    assert [name for name in CHANNEL_FIELDS if count[name] == 0] == []  # read by nobody
-    assert [name for name in CHANNEL_FIELDS if count[name] > 1] == []  # read by several
+    for name in CHANNEL_FIELDS:
+        place = f"{where_field(Mission, name)}: {name}"
+        assert count[name] != 0, f"{place} is read by no effect, nor by the plain radio"
+        assert count[name] == 1, f"{place} is read by several"
     assert {"position_noise_m", "position_noise_s"} <= NOISE
 
 
@@ -101,10 +104,20 @@ def missions_with(effect):
                 yield mission
 
 
+def numbers(model):
+    """All numbers of a channel, those of its parts too."""
+    for part in model:
+        if isinstance(part, tuple):
+            yield from numbers(part)
+        else:
+            yield part
+
+
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_makes_another_channel_and_is_named(effect):
+    place = f"{where_class(effect)}: {effect.__name__}"
     missions = list(missions_with(effect))
-    assert missions
+    assert missions, f"{place} is had by no mission, whatever it reads"
     for mission in missions:
         (found,) = effects_of(mission)
         assert type(found) is effect
@@ -116,9 +129,9 @@ def test_an_effect_makes_another_channel_and_is_named(effect):
             name, _, value = said.partition(" ")
             assert value == as_typed(getattr(mission, name))
         plain = model_of(radio_of(mission), 4, effects=[])
-        changed = found.change(plain)
-        differs = [one is not other for one, other in zip(plain, changed, strict=True)]
-        assert any(differs)
+        pairs = zip(numbers(plain), numbers(found.change(plain)), strict=True)
+        differs = [not np.array_equal(one, other) for one, other in pairs]
+        assert any(differs), f"{place} changes no number of the channel, in {found.title}"
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

@@ -3,6 +3,7 @@
 from dataclasses import replace
 
 import pytest
+from declared import where_text
 from reading import entities
 from rerun.chunk import RrdReader
 
@@ -56,7 +57,9 @@ def test_paths_are_layers_own_and_below_a_view():
     paths = [layer.path for layer in its]
     assert len(set(paths)) == len(paths)
     views = tuple(f"{view.path}/" for view in declared(View).values())
-    assert all(path.startswith(views) for path in paths)
+    for path in paths:
+        place = where_text(layers.__file__, f'path="{path}"')
+        assert path.startswith(views), f"{place}: {path} is below none of the views"
 
 
 def test_every_layer_is_drawn_by_some_mission_and_nothing_else(found):

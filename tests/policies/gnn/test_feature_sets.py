@@ -3,9 +3,10 @@
 import hashlib
 import inspect
 import json
-from pathlib import Path
+import re
 
 import pytest
+from declared import where_text
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn import feature_sets
@@ -50,11 +51,13 @@ def test_the_sets_are_what_policies_of_1_0_were_trained_on(features):
 
     Two features that change places are named, with the file they stand in.
     """
-    file = Path(inspect.getfile(FEATURE_SETS[features])).name
+    file = inspect.getfile(FEATURE_SETS[features])
     now = FEATURE_SETS[features].names
     then = FEATURES_OF_1_0[features]
-    for number, (is_now, was) in enumerate(zip(now, then, strict=False), start=1):
-        assert is_now == was, f"{file}: number {number} of the {features} features"
+    for number, (its, was) in enumerate(zip(now, then, strict=False), start=1):
+        place = where_text(file, f'"{re.escape(its)}"')
+        changed = f"{place}: number {number} of the {features} features was {was!r} and is {its!r}"
+        assert its == was, f"{changed} now"
     assert len(now) == len(then), f"{file}: another number of {features} features"
 
 
