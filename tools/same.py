@@ -32,7 +32,7 @@ from collections.abc import Callable, Iterable, Mapping, Sequence
 from concurrent.futures import ProcessPoolExecutor, as_completed
 from contextlib import redirect_stderr, redirect_stdout
 from importlib.metadata import PackageNotFoundError, version
-from multiprocessing import get_context
+from multiprocessing import active_children, get_context
 from pathlib import Path
 from typing import Any
 from unittest import mock
@@ -204,7 +204,7 @@ def train(options: str, folder: Path) -> str:
 
 def traces_of(task: str) -> Traces:
     """Do a task by its name; an error is a trace, too, so that it stops no other task."""
-    with tempfile.TemporaryDirectory() as folder:
+    with tempfile.TemporaryDirectory(dir=Path.cwd()) as folder:
         try:
             if task in FLIGHTS:
                 return {task: fly(FLIGHTS[task])}
@@ -249,29 +249,26 @@ def do_all(tasks: Sequence[str], jobs: int, console: Console) -> Traces:
         write_files(Path(folder))
         # Spawned, so that libraries count their threads anew.
         executor = ProcessPoolExecutor(
-            jobs, get_context("spawn"), initializer=_begin_work, initargs=(folder,)
+            jobs, get_context("spawn"), initializer=os.chdir, initargs=(folder,)
         )
         with executor, bar:
             at_work = bar.add_task("Flying", total=len(tasks), last="")
+            # Processes begin here, and inherit that a Ctrl-C is not for them.
+            signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
             futures = {executor.submit(traces_of, task): task for task in tasks}
+            signal.pthread_sigmask(signal.SIG_UNBLOCK, {signal.SIGINT})
             try:
                 for future in as_completed(futures):
                     done[futures[future]] = future.result()
                     bar.update(at_work, advance=1, last=futures[future])
             except KeyboardInterrupt:
-                executor.shutdown(wait=False, cancel_futures=True)
+                for process in active_children():
+                    process.kill()  # it writes nothing but into the folder, which goes now
                 raise
     traces: Traces = {}
     for task in tasks:
         traces |= done[task]
     return traces
-
-
-def _begin_work(folder: str) -> None:
-    """Prepare a process that works: a Ctrl-C is for the one that waits for it."""
-    # Not SIG_IGN, which a training in a process of its own would inherit.
-    signal.signal(signal.SIGINT, lambda *_: None)
-    os.chdir(folder)
 
 
 # What is compared.
