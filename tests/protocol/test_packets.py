@@ -201,3 +201,15 @@ def test_a_policy_flown_after_one_with_a_payload_has_its_own_room():
     swarm.buffers = with_room(swarm.buffers, 3)  # as a policy with a payload leaves them
     swarm.step(make_policy("tdma", mission))
     assert swarm.buffers.num_entries == 12
+
+
+@pytest.mark.parametrize("fresh", [1, 2])
+def test_of_entries_that_rose_alike_the_freshest_is_sent(fresh):
+    """Robot 0 has room for one entry beside its own; both others rose by 1 since it sent them."""
+    buffers = with_room(empty_buffers(1, 3), 2)
+    stale = 3 - fresh
+    buffers.timestamp[0, 0] = 6.0
+    buffers.timestamp[0, 0, [fresh, stale]] = [5.0, 3.0]
+    buffers.last_sent[0, 0, [fresh, stale]] = [4.0, 2.0]
+    sent = entries_sent(buffers, np.array([[1, 1, 2]]))
+    assert sent[0, 0, [0, fresh, stale]].tolist() == [6.0, 5.0, ABSENT]
