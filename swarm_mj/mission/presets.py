@@ -230,7 +230,7 @@ def make_mission(
                 f"preset {preset} goes with a task's name, and this mission is given whole, from "
                 f"the preset {mission.preset}; leave it out"
             )
-        return replace(mission, **given)
+        return replace(mission, **given) if given else mission
     if mission is not None:
         if "task" in given:
             # In Python's words: `mission` is where it was given first.

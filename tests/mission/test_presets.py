@@ -39,7 +39,7 @@ def test_a_mission_is_made_of_a_task_of_a_preset_or_of_another_mission():
     assert make_mission(preset="urban") == PRESETS["urban"]("random-walk")
     assert make_mission("flocking", preset="urban", num_robots=9).num_robots == 9
     walk = reference("random-walk", num_robots=7)
-    assert make_mission(walk) == make_mission(walk, preset="reference") == walk
+    assert make_mission(walk) is make_mission(walk, preset="reference") is walk
     assert make_mission(walk, num_robots=8) == reference("random-walk", num_robots=8)
 
 
