@@ -155,7 +155,7 @@ class Options:
     )
     episodes: int = setting(50, "missions a probability", low=2, high=10_000)
     seed: int = setting(5000, "of the first mission; an evaluation's begin at 1000")
-    num_windows: int = same_as(Mission, "num_windows")
+    num_windows: int = same_as(Mission, "num_windows", is_common=False)
     out: Path = setting(TABLE, "the table", metavar="FILE.csv", shown="the package's")
 
 

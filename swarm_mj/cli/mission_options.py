@@ -17,8 +17,6 @@ from swarm_mj.system.fields import About, about_of, as_typed, kind_of, setting
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
-# What most people set: `--help` shows these, and `--help-all` the others, too.
-COMMON = ("preset", "task", "num_robots", "range_ratio", "num_windows", "arena")
 SPECS = [spec for spec in fields(Mission) if about_of(spec).help]
 FLAGS = {spec.name: flags_of(spec)[0] for spec in SPECS}
 USUAL = paper("flocking"), paper("stationary")  # whose defaults are shown
@@ -126,8 +124,8 @@ def about_option(spec: Field[Any]) -> About:
     """Return what the help says of a field of `Mission`: what it says itself, and what is there."""
     about = about_of(spec)
     if spec.name == "arena":  # the mission's room comes before the one that knows the arenas
-        about = replace(about, help=f"{about.help}: {', '.join(ARENAS)}, or an MJCF file")
-    return replace(about, is_common=spec.name in COMMON)
+        return replace(about, help=f"{about.help}: {', '.join(ARENAS)}, or an MJCF file")
+    return about
 
 
 def mission_options(*, is_many: bool = False) -> Iterator[Option]:

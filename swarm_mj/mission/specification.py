@@ -73,6 +73,7 @@ class Mission:
         label="preset",
         source="IV-B",
         choices=get_args(Preset),
+        is_common=True,
     )
     task: Task = setting(
         "flocking",
@@ -80,6 +81,7 @@ class Mission:
         label="task",
         source="IV",
         choices=get_args(Task),
+        is_common=True,
     )
 
     # The team and its area.
@@ -91,6 +93,7 @@ class Mission:
         low=2,
         high=10_000,
         source="IV-B",
+        is_common=True,
     )
     density_per_km2: float = setting(
         40.0,
@@ -108,6 +111,7 @@ class Mission:
         low=0.01,
         high=10.0,
         source="IV-B",
+        is_common=True,
     )
 
     # How robots move (IV-A).
@@ -146,6 +150,7 @@ class Mission:
         low=1,
         high=100_000,
         source="IV-B",
+        is_common=True,
     )
 
     # The radio.
@@ -226,6 +231,7 @@ class Mission:
         label="arena",
         source=NEW,
         metavar="NAME",
+        is_common=True,
     )
 
     # Path loss.

@@ -6,7 +6,7 @@ line at once.
 
 import inspect
 from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields
+from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from difflib import get_close_matches
 from functools import cache, partial
 from numbers import Integral, Real
@@ -176,10 +176,16 @@ def about_of(spec: Field[Any]) -> About:
     return spec.metadata.get(ABOUT, About())
 
 
-def same_as(owner: type[Any], name: str) -> Any:  # noqa: ANN401 - as the other field's value
-    """Return a field like another dataclass's: its default, meaning and range."""
+def same_as(owner: type[Any], name: str, *, is_common: bool | None = None) -> Any:  # noqa: ANN401 - as the other field's value
+    """Return a field like another dataclass's: its default, meaning and range.
+
+    `is_common` says otherwise than the other field whether `--help` always shows it.
+    """
     spec = owner.__dataclass_fields__[name]
-    return field(default=spec.default, metadata=spec.metadata)
+    about = about_of(spec)
+    if is_common is not None:
+        about = replace(about, is_common=is_common)
+    return field(default=spec.default, metadata={ABOUT: about})
 
 
 @cache
