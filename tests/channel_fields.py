@@ -5,17 +5,19 @@ from dataclasses import fields
 from swarm_mj.mission import Mission
 from swarm_mj.mission.presets import NEEDED
 from swarm_mj.mission.specification import CHANNEL
+from swarm_mj.system.fields import about_of
 
 SPECS = {spec.name: spec for spec in fields(Mission)}
-CHANNEL_FIELDS = [name for name, spec in SPECS.items() if spec.metadata.get("group") == CHANNEL]
+CHANNEL_FIELDS = [name for name, spec in SPECS.items() if about_of(spec).group == CHANNEL]
 
 
 def other_values(name):
     """Values of a field besides its default: every other choice, or one between its bounds."""
     spec = SPECS[name]
-    if "choices" in spec.metadata:
-        return [choice for choice in spec.metadata["choices"] if choice != spec.default]
-    return [0.5 * (spec.metadata["low"] + spec.metadata["high"])]
+    about = about_of(spec)
+    if about.choices:
+        return [choice for choice in about.choices if choice != spec.default]
+    return [0.5 * (about.low + about.high)]
 
 
 def counting(name):
