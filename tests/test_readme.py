@@ -30,7 +30,7 @@ REASONS = {
     "takes minutes": "train",
     "needs SLURM": "slurm",
 }
-LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml", "toml"}
+LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml", "toml", "diff"}
 # Commands run as they are written, but for less long: what comes last on a line counts.
 CUT_SHORT = {
     "bench": "--seconds 0.1 --missions 1 --episodes 0 --no-learning",

@@ -117,13 +117,17 @@ def test_what_counts_with_another_field_counts_with_one_that_is_there_and_is_off
     on = {name: switch for name, switch in switches.items() if switch}
     assert {switch.name for switch in on.values()} < names
     assert not any(switch.is_on(paper()) for switch in on.values())
-    assert {name: switch.name for name, switch in on.items() if switch.state} == {
-        "loss_exponent": "path_loss",
-        "reference_m": "path_loss",
-        "antenna_height_m": "path_loss",
-        "rician_k": "fading",
-        "map_offset_m": "prior_knowledge",
-    }
+    by_state = {name: switch.name for name, switch in on.items() if switch.state}
+    assert (
+        by_state.items()
+        >= {
+            "loss_exponent": "path_loss",
+            "reference_m": "path_loss",
+            "antenna_height_m": "path_loss",
+            "rician_k": "fading",
+            "map_offset_m": "prior_knowledge",
+        }.items()
+    )
 
 
 @pytest.mark.parametrize(("former", "present"), former_names(Mission).items())

@@ -82,9 +82,7 @@ def test_losses_of_a_file_are_kept_without_a_word(tmp_path, recwarn):
 
 
 def test_an_unknown_arena_or_a_broken_file_is_an_error_that_says_so(tmp_path):
-    with pytest.raises(
-        ValueError, match=r"open, blocks, forest, rooms, or an MJCF file, not 'sea'"
-    ):
+    with pytest.raises(ValueError, match=f"{', '.join(ARENAS)}, or an MJCF file, not 'sea'"):
         compose(paper(arena="sea"))
     file = tmp_path / "broken.xml"
     file.write_text(PILLAR.replace('size="20 5"', 'size="twenty"'))

@@ -75,7 +75,9 @@ def test_every_class_says_all_of_itself(kind):
     summary, _, _ = kind.__doc__.partition("\n")
     assert summary.endswith(".")
     assert kind.payload == about.payload_name
-    assert (about.payload is not None) == ("payload_fields" in vars(kind) and kind is Planner)
+    # Fields without a name and a meaning, or the other way round, would be carried in silence.
+    rest = paper("stationary", num_robots=4)
+    assert bool(make_policy(about.name, rest).payload_fields(rest)) == (about.payload is not None)
     makes = kind.with_probability if issubclass(kind, RandomTransmission) else kind.for_mission
     assert makes.__func__ is not Policy.for_mission.__func__
 

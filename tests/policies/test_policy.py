@@ -10,7 +10,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.centralised import MinimumSpanningTree
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
-from swarm_mj.policies.registry import POLICIES, make_policy
+from swarm_mj.policies.registry import LISTED, POLICIES, make_policy
 from swarm_mj.protocol.packets import PacketField
 from swarm_mj.simulation.swarm import Swarm
 
@@ -23,7 +23,8 @@ SENSED = [
 DECENTRALISED = [name for name in POLICIES if name not in (*CENTRALISED, *SENSED)]
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.
-PAYLOAD = {"planner": "snapshots"}  # what packets carry beyond T, M and P
+# What packets carry beyond T, M and P.
+PAYLOAD = {name: about.payload_name for name, about in LISTED.items() if about.payload is not None}
 VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma")]
 ROW = 3  # the robot whose knowledge the law keeps
 
@@ -138,6 +139,7 @@ def test_ii_b_every_named_policy_is_of_one_kind_and_says_what_packets_carry(name
     assert policy.is_centralised == (name in CENTRALISED)
     assert isinstance(policy, DecentralisedPolicy) == (name in DECENTRALISED)
     assert policy.payload == PAYLOAD.get(name, "none")
+    assert PAYLOAD["planner"] == "snapshots"
 
 
 def flown(mission, seeds, policy):
