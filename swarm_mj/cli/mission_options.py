@@ -19,7 +19,9 @@ NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
 SPECS = [spec for spec in fields(Mission) if about_of(spec).help]
 FLAGS = {spec.name: flags_of(spec)[0] for spec in SPECS}
-USUAL = paper("flocking"), paper("stationary")  # whose defaults are shown
+# Missions whose defaults are shown: of flocks, and of other tasks.
+USUAL_FLOCK = paper("flocking")
+USUAL_OTHER = paper("stationary")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,7 +147,8 @@ several_missions = partial(nested, partial(mission_options, is_many=True), missi
 
 def _default_of(spec: Field[Any]) -> str:
     """Return a mission's default; where it depends on the task, the flock's and the others'."""
-    flocks, others = (as_typed(getattr(mission, spec.name)) for mission in USUAL)
+    flocks = as_typed(getattr(USUAL_FLOCK, spec.name))
+    others = as_typed(getattr(USUAL_OTHER, spec.name))
     if spec.name == "task":
         return f"{flocks}; {PRESETS[next(iter(WORLDS))]().task} under {', '.join(WORLDS)}"
     if flocks == others:

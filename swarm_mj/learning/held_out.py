@@ -26,6 +26,7 @@ from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import GnnPolicy
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
@@ -177,8 +178,8 @@ def record_replay(
 
 
 def _means(training: Training, costs: Flown) -> Row:
-    age = _samples(costs, "aoi")
-    variance = _samples(costs, "velocity-variance")
+    age = _samples(costs, AOI.reward)
+    variance = _samples(costs, VELOCITY_VARIANCE.reward)
     if training.reward == "aoi":
         # Ages grow with the team; divided by its size, no size outweighs the others.
         objective = [of_size / n for of_size, n in zip(age, training.robots, strict=True)]
@@ -199,8 +200,13 @@ def _means(training: Training, costs: Flown) -> Row:
     return means
 
 
-def _samples(costs: Flown, cost: str) -> Samples:
-    return [getattr(each, cost.replace("-", "_")) for each in costs]
+def _samples(costs: Flown, reward: str) -> Samples:
+    """Return each mission's cost, by what the reward for it is called."""
+    if reward == AOI.reward:
+        return [each.aoi for each in costs]
+    if reward == VELOCITY_VARIANCE.reward:
+        return [each.velocity_variance for each in costs]
+    raise ValueError(f"no cost is called {reward}; there are {', '.join(JUDGED)}")
 
 
 def _compared(samples: Samples, kept: Samples) -> Cost:

@@ -12,6 +12,7 @@ from pathlib import Path
 
 from swarm_mj.learning.selection import OTHER_FLIGHTS, Row, num_missions
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
+from swarm_mj.policies.gnn.feature_sets import remembers_packets
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
 from swarm_mj.simulation.memory import LIBRARIES, TORCH, learned_memory
@@ -186,7 +187,7 @@ def rollout_bytes(training: Training) -> int:
     nodes = max(training.robots)
     rows = training.missions * nodes  # a graph each
     graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
-    remembered = 4 * nodes**2 if training.features in ("local", "extended") else 0
+    remembered = 4 * nodes**2 if remembers_packets(training.features) else 0
     return rows * (graph * (training.ppo.num_steps + 1) + remembered)
 
 

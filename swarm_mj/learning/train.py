@@ -2,6 +2,7 @@
 
 import math
 import time
+from collections.abc import Iterable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -258,7 +259,7 @@ class TrainingSession(BaseCallback):
     def _keep(self, decisions: int, costs: Row, choice: Choice | None) -> None:
         """Store the policy of the evaluation after this many decisions, with its costs."""
         training = self._training
-        (row,) = (each for each in self.progress.curve if each["decisions"] == decisions)
+        row = _row_at(self.progress.curve, decisions)
         made = {
             "command": self._run.command,
             "decisions": decisions,
@@ -274,3 +275,11 @@ class TrainingSession(BaseCallback):
             version=version(),
         )
         save_gnn(self._folder / POLICY, self._networks[decisions], config)
+
+
+def _row_at(curve: Iterable[Row], decisions: int) -> Row:
+    """Return the evaluation after this many decisions."""
+    for row in curve:
+        if row["decisions"] == decisions:
+            return row
+    raise LookupError(f"the curve has no evaluation after {decisions} decisions")

@@ -117,7 +117,7 @@ def _window(
     answered: Int[np.ndarray, "B N"],
     heard_answer: Int[np.ndarray, "B N"],
 ) -> None:
-    """Play a transmission phase and a response phase; fill in the last three arrays."""
+    """Play a transmission phase and a response phase; fill in what was heard and answered."""
     t = _a_slot_after(now)
     write_attempt(last_attempt, requested, t, silence_is_attempt, is_active)
     _play_slot(
@@ -177,7 +177,7 @@ def _broadcast(
     recipient: Int[np.ndarray, "B N"],
     heard: Int[np.ndarray, "B N"],
 ) -> None:
-    """Play a single slot; fill in the last array."""
+    """Play a single slot; fill in what was heard."""
     t = _a_slot_after(now)
     write_attempt(last_attempt, recipient, t, silence_is_attempt, is_active)
     _play_slot(

@@ -214,6 +214,10 @@ class Swarm:
             raise ValueError("no policy flies yet; start one: swarm.start(policy)")
         return self._policy
 
+    def _check_started(self) -> None:
+        """Raise ValueError before a policy was started."""
+        _ = self.policy
+
     def start(self, policy: Policy) -> None:
         """Fly a policy from now on, with new random streams and all else forgotten.
 
@@ -279,7 +283,7 @@ class Swarm:
         """
         if policy is not None and policy is not self._policy:
             self.start(policy)
-        _ = self.policy  # raises if none was started
+        self._check_started()
         return self._play(self._window, self.decide)
 
     def step_with_recipients(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:

@@ -122,7 +122,8 @@ def _write_times(
             order = np.argsort(since)
             rank = 0
             for place, k in enumerate(order):  # who is equally stale has the same rank
-                rank = place if since[k] > since[order[place - 1]] else rank
+                if place > 0 and since[k] > since[order[place - 1]]:
+                    rank = place
                 of_next: BufferNode = node[b, i, k]
                 of_next.rank = share_of_team(rank)
 

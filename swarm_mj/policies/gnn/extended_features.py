@@ -71,6 +71,7 @@ class ExtendedFeatures(FeatureExtractor):
         "its buffer, the packets it sent and received, the size of the team, and whose turn it is "
         "by the rule of spatial-tdma, in the order of identities and by the clock"
     )
+    remembers_packets: ClassVar[bool] = True
 
     def start(self, num_missions: int, num_robots: int) -> None:
         """Forget the packets of earlier missions."""

@@ -48,6 +48,11 @@ def num_features(features: str) -> int:
     return len(_feature_set(features).names)
 
 
+def remembers_packets(features: str) -> bool:
+    """Return whether a set keeps packets, N² numbers a robot; raises as `make_extractor`."""
+    return _feature_set(features).remembers_packets
+
+
 def known_names(features: str) -> tuple[str, ...]:
     """Return the names of a set's features, in order; none of a user's own that is not loaded."""
     known = FEATURE_SETS | _own

@@ -62,6 +62,7 @@ class FeatureExtractor(ABC):
 
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
     uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words
+    remembers_packets: ClassVar[bool] = False  # whether it keeps N² numbers for each robot
 
     def __init__(self, mission: Mission) -> None:
         """Take the mission whose area, duration and range normalise the features."""

@@ -240,7 +240,8 @@ class _Team:
     def _are_flown(self, slot: int) -> bool:
         """Return whether all robots begin to use the tables made last."""
         first = round(self._settings.first_table_rounds * self._round)
-        return slot in range(first, slot + 1, round(self._settings.flown_rounds * self._round))
+        every = round(self._settings.flown_rounds * self._round)
+        return slot >= first and (slot - first) % every == 0
 
     def _owner(self, i: int) -> int | None:
         """Return the owner of the table that i flies by; None if it changes nothing."""
