@@ -34,7 +34,10 @@ SHOWS = {
         '"payload": "age"',
     ),
     "A mission field with an option": (COMMAND.format("fly --help-all"), "--failure-at"),
-    "A path loss": (COMMAND.format(f"fly --path-loss cluttered {FLY}"), "path_loss cluttered"),
+    "A path loss": (
+        COMMAND.format(f"fly --path-loss cluttered --clutter-m 240 {FLY}"),
+        "path_loss cluttered",
+    ),
     "A task with a cost": (COMMAND.format(f"fly --task gathering {FLY}"), "spread of the team"),
     "A replay layer": (
         "from swarm_mj.replay import layers; print(layers.CENTRE.path)",

@@ -108,7 +108,14 @@ class Run:
         return f"<table><caption>{escape(self.title)}</caption>{''.join(rows)}</table>"
 
     def table(self) -> Table:
-        """Return the numbers as a table, for terminals."""
+        """Return the numbers as a table, for terminals.
+
+        Returns:
+            A table of rich's, a name and a value per row, with the flight's title above it.
+
+        Example:
+            >>> rich.print(run.table())
+        """
         return terminal.named_values(self.title, self._rows, caption=AGE)
 
     @property
@@ -255,6 +262,13 @@ class Run:
 
         Args:
             replay: Where the flight's replay was written, if it was.
+
+        Returns:
+            `config`, the summary's numbers by their names, and `replay`, a path or None.
+
+        Example:
+            >>> run.report()["aoi_mean"] == run.summary.aoi_mean
+            True
         """
         shown = None if replay is None else str(replay)
         return {"config": dict(self.config), **self.summary, "replay": shown}

@@ -128,6 +128,15 @@ def flocking(
     The flocking set F is of robots with T > T_0 (`heard`, the paper) or, per axis, with a velocity
     other than 0 in the buffer (`moving`, the authors' code). The robot itself is in it; while F is
     empty the acceleration is 0.
+
+    Args:
+        buffers: What each robot knows of the others' velocities, [B N N 2] [m/s], and of whom it
+            knows anything, [B N N].
+        velocity_mps: The robots' own velocities, [B N 2] [m/s].
+        flocking_set: "heard" or "moving".
+
+    Returns:
+        The accelerations u, [B N 2] [m/s²]; the physics clips them.
     """
     is_counted = None if flocking_set == "moving" else buffers.is_known
     return _mean_difference(is_counted, buffers.velocity_mps, velocity_mps)

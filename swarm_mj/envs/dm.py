@@ -35,8 +35,27 @@ def make_environment(
 ) -> control.Environment:
     """Return one mission as an environment of dm_control, and so of dm_env.
 
-    A step is a window, an episode is a mission: the first one with the seed given, the next one
-    with `seed + 1`, and so on. The components are those of `Swarm`; raises as that does.
+    A step is a window, an episode is a mission.
+
+    Args:
+        mission: The mission.
+        seed: Of the first mission, an integer of 0 or more; the next one has `seed + 1`, and so on.
+        channel: As of `Swarm`: who decodes whom; None is the mission's own.
+        controller: As of `Swarm`: what drives the robots; None is the task's own.
+        scene: As of `Swarm`: a function that adds obstacles; None adds none but those of the
+            mission's arena.
+
+    Returns:
+        The environment. An action is the recipient of each robot, [N] integers from 0 to N - 1,
+        itself for silence; the reward is minus the age of information after the window [windows].
+
+    Raises:
+        ValueError: As `Swarm` does: if the seed is out of range, or if no connected team could be
+            drawn or the scene changed the robots.
+        TypeError: As `Swarm` does: for what is no mission, or cannot be called.
+
+    Example:
+        >>> time_step = make_environment(paper("flocking"), seed=1).reset()
     """
     swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene)
     return control.Environment(SwarmPhysics(swarm, seed), SwarmTask(seed))

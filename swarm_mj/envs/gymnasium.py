@@ -112,16 +112,46 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     def reset(
         self, *, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[Observation, Info]:
-        """Begin a mission, whose seed is in `info`; options are ignored."""
+        """Begin a mission, whose seed is in `info`.
+
+        Args:
+            seed: The mission's, an integer of 0 or more; None draws another mission from the last
+                seed given.
+            options: Ignored.
+
+        Returns:
+            The team's observation and the info. The observation has `observation` [N N F] and
+            `action_mask` [N N], row i of each being robot i's, and `parent` [N N] if the option
+            `with_parents` is set. The info has the seed, and the costs by the names of
+            `swarm-mj fly --json`.
+
+        Raises:
+            ValueError: If no connected team could be drawn.
+            gymnasium.error.Error: If the seed is not an integer of 0 or more.
+            OSError: In the mode "human", if there is no display.
+
+        Example:
+            >>> observation, info = SwarmEnv("flocking", num_robots=5).reset(seed=1)
+        """
         super().reset(seed=seed, options=options)
         self.batch.restart([seed_or_next(seed, self.np_random)])
         return self._seen()
 
     def step(self, action: np.ndarray) -> tuple[Observation, float, bool, bool, Info]:
-        """Fly one window; `action[i]` is the recipient of robot i, itself for silence.
+        """Fly one window, in which each robot addresses the recipient that the action names.
 
-        Raises ValueError if the action is not one integer from 0 to N - 1 per robot, or the mission
-        is over.
+        Args:
+            action: The recipient of each robot, [N] integers from 0 to N - 1; itself is silence.
+
+        Returns:
+            The team's observation after the window; its reward, minus the cost that the option
+            `reward` names, in its unit; False, as no mission terminates; whether this was the last
+            window (truncated); and the info, as of `reset`.
+
+        Raises:
+            ValueError: If the action is not one integer from 0 to N - 1 per robot, if no mission
+                has begun, or if it is over.
+            OSError: In the mode "human", if there is no display.
         """
         reward = self.batch.step(np.asarray(action)[np.newaxis])
         observation, info = self._seen()
@@ -132,7 +162,15 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         return self.batch.observation["action_mask"].ravel().astype(np.bool_)
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """Draw the mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""
+        """Draw the mission as it is now, in the mode "rgb_array".
+
+        Returns:
+            A picture, [H W 3] with H = 600 and W = 800 [pixels]; None in any other mode.
+
+        Raises:
+            ValueError: If no mission has begun.
+            OSError: If OpenGL does not work here.
+        """
         return self._screen.picture(self.batch)
 
     def close(self) -> None:

@@ -67,12 +67,27 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         seed: int | Sequence[int | None] | None = None,
         options: dict[str, Any] | None = None,
     ) -> tuple[Observation, Info]:
-        """Begin missions, all or those of `options["reset_mask"]` [B].
+        """Begin missions, all or those of `options["reset_mask"]`.
 
-        The seed is one for each environment; or the first one's, which the others count on from; or
-        None, for missions drawn from the last seeds given. Raises ValueError unless there is one
-        seed and one bool per environment, or if no connected team could be drawn; TypeError if
-        there is no such option.
+        Args:
+            seed: One for each environment, [B], where None draws that environment's mission from
+                its last seed; or the first one's, which the others count on from; or None, which
+                draws all of them.
+            options: `{"reset_mask": mask}` with one bool for each environment, [B], at least one of
+                them True; None begins all missions.
+
+        Returns:
+            The observations of all environments, [B, ...] each, and the infos of the missions that
+            began: [B] each, next to a mask of the same name with a leading underscore.
+
+        Raises:
+            ValueError: Unless there is one seed and one bool per environment, or if no connected
+                team could be drawn.
+            TypeError: If there is no such option.
+            gymnasium.error.Error: If a seed is not an integer of 0 or more.
+
+        Example:
+            >>> seen, infos = SwarmVectorEnv(4, "flocking").reset(seed=1)  # seeds 1 to 4
         """
         check_names("reset", options or {}, ("reset_mask",))
         super().reset(seed=seed if isinstance(seed, int) else None)
@@ -96,7 +111,27 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
     def step(
         self, actions: np.ndarray
     ) -> tuple[Observation, np.ndarray, np.ndarray, np.ndarray, Info]:
-        """Fly a window of each mission; `actions[b, i]` is robot i's; raises as `SwarmEnv.step`."""
+        """Fly one window of each mission that is not over.
+
+        What follows a mission's last window depends on the autoreset mode. In NEXT_STEP the next
+        step begins another mission, ignores the actions of that environment, and pays it 0. In
+        SAME_STEP another one begins at once, and the infos have `final_obs` and `final_info`. In
+        DISABLED `reset` begins it.
+
+        Args:
+            actions: The recipient of each robot, [B N] integers from 0 to N - 1; itself is silence.
+
+        Returns:
+            The observations, [B, ...] each; the rewards [B], each minus the cost that the option
+            `reward` names, in its unit; all False [B], as no mission terminates; which missions had
+            their last window (truncated) [B]; and the infos, [B] each, next to masks of whose they
+            are.
+
+        Raises:
+            ValueError: If the actions are not one integer from 0 to N - 1 per robot, if no mission
+                has begun, if one is over in the mode DISABLED, or if no connected team could be
+                drawn.
+        """
         actions = np.asarray(actions)
         self._check_step(actions)
         reward = np.zeros(self.num_envs)

@@ -89,9 +89,17 @@ class MissionBatch:
     def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
         """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
 
-        Return the reward of each robot; all of a team alike, unless the reward is credit. Raises
-        ValueError if no mission has begun, they are over, or a recipient is no robot; then nothing
-        has moved.
+        Args:
+            recipient: Whom each robot addresses, [B N], from 0 to N - 1.
+
+        Returns:
+            The reward of each robot, [B N]: minus the cost that `reward` names, in its unit, the
+            same for a whole team; or, for "credit", the age that its own packets saved, a mean over
+            pairs of robots [windows].
+
+        Raises:
+            ValueError: If no mission has begun, they are over, or a recipient is no robot; then
+                nothing has moved.
         """
         if self.reward != "credit":
             self.fly(recipient)
@@ -110,7 +118,17 @@ class MissionBatch:
         return credit / self.mission.num_robots**2  # a mean over pairs: team sizes count alike
 
     def fly(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
-        """Fly a window as `step` does, without working out rewards."""
+        """Fly a window as `step` does, without computing rewards.
+
+        Args:
+            recipient: Whom each robot addresses, [B N], from 0 to N - 1; itself is silence.
+
+        Returns:
+            What the window cost, in every mission; `costs` keeps it, too.
+
+        Raises:
+            ValueError: As `step` does.
+        """
         if self.is_over:
             raise ValueError(
                 f"the mission is over after its {self.last_window} windows; call reset()"

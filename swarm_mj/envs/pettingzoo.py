@@ -30,7 +30,17 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     def __init__(
         self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
     ) -> None:
-        """Take a mission or its task, and options of `make_batch`; raises as that does."""
+        """Take a mission, and how it is shown and paid.
+
+        Args:
+            mission: The mission, or its task.
+            render_mode: "rgb_array", "human", or None for no pictures.
+            **options: As of `make_batch`: the reward, the features, and any field of `Mission`.
+
+        Raises:
+            ValueError: If a value is unknown or out of range, or does not go with another.
+            TypeError: If an option is unknown, or a component cannot be called.
+        """
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
         self._screen, self.render_mode = Screen(render_mode), render_mode
@@ -47,17 +57,56 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         self._rng, _ = seeding.np_random()
 
     def observation_space(self, agent: str) -> Space[Any]:
-        """Return an agent's view; see `robot_spaces`."""
+        """Return the space of an agent's view; see `robot_spaces`.
+
+        Args:
+            agent: Its name, `robot_0` to `robot_{N-1}`.
+
+        Returns:
+            The agent's own space, the same object on every call.
+
+        Raises:
+            KeyError: If there is no such agent.
+        """
         return self.observation_spaces[agent]
 
     def action_space(self, agent: str) -> Space[Any]:
-        """Return an agent's recipients; its own number is silence."""
+        """Return the space of an agent's recipients, 0 to N - 1; its own number is silence.
+
+        Args:
+            agent: Its name, `robot_0` to `robot_{N-1}`.
+
+        Returns:
+            The agent's own space, the same object on every call.
+
+        Raises:
+            KeyError: If there is no such agent.
+        """
         return self.action_spaces[agent]
 
     def reset(
         self, seed: int | None = None, options: dict[str, Any] | None = None
     ) -> tuple[dict[str, Observation], dict[str, Info]]:
-        """Begin a mission, whose seed is in every agent's info; options are ignored."""
+        """Begin a mission, whose seed is in every agent's info.
+
+        Args:
+            seed: The mission's, an integer of 0 or more; None draws another mission from the last
+                seed given.
+            options: Ignored.
+
+        Returns:
+            The views and the infos, by agent. A view has `observation` [N F] and `action_mask` [N],
+            and `parent` [N] if the option `with_parents` is set; an info has the seed and the
+            team's costs.
+
+        Raises:
+            ValueError: If no connected team could be drawn.
+            gymnasium.error.Error: If the seed is not an integer of 0 or more.
+            OSError: In the mode "human", if there is no display.
+
+        Example:
+            >>> views, infos = parallel_env("flocking", num_robots=5).reset(seed=1)
+        """
         del options
         if seed is not None:
             self._rng, _ = seeding.np_random(seed)
@@ -73,8 +122,20 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Fly one window, in which each agent addresses a robot.
 
         An agent without an action is silent, and so is one that has dropped out whatever it does.
-        Everyone's info has the team's costs. All is empty once no agent is left. Raises ValueError
-        if there is no such agent, or an action is no robot; then nothing has moved.
+
+        Args:
+            actions: The recipient of each agent, from 0 to N - 1; its own number is silence.
+
+        Returns:
+            By agent, of those that were left before the window: its view; its reward, in the unit
+            of the option `reward`; whether it has failed (terminated); whether this was the last
+            window (truncated); and its info, which has the team's costs. All are empty once no
+            agent is left.
+
+        Raises:
+            ValueError: If there is no such agent, an action is no robot, or no mission has begun;
+                then nothing has moved.
+            OSError: In the mode "human", if there is no display.
         """
         [chosen] = self.batch.flown.views.silence.tolist()
         for agent, action in actions.items():
@@ -96,15 +157,30 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         return seen, rewards, ended, cut, infos
 
     def state(self) -> Float32[np.ndarray, "S"]:
-        """Return the truth, for a centralised critic; no robot observes it; see `truth`."""
+        """Return the truth, for a centralised critic; no robot observes it; see `truth`.
+
+        Returns:
+            Normalised numbers without a unit, [S], where S = 1 + N (5 + N).
+
+        Raises:
+            ValueError: If no mission has begun.
+        """
         return truth(self.batch)[0]
 
     def render(self) -> UInt8[np.ndarray, "H W 3"] | None:
-        """Draw the mission as it is now, in the mode "rgb_array"; raises OSError without OpenGL."""
+        """Draw the mission as it is now, in the mode "rgb_array".
+
+        Returns:
+            A picture, [H W 3] with H = 600 and W = 800 [pixels]; None in any other mode.
+
+        Raises:
+            ValueError: If no mission has begun.
+            OSError: If OpenGL does not work here.
+        """
         return self._screen.picture(self.batch)
 
     def close(self) -> None:
-        """Give back what pictures took."""
+        """Release what pictures took: the renderer, or the viewer's window."""
         self._screen.close()
 
     def _seen(self) -> tuple[dict[str, Observation], dict[str, Info]]:
@@ -118,5 +194,20 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
 
 
 def parallel_env(mission: Mission | str = "flocking", **options: Any) -> SwarmParallelEnv:
-    """Return a mission as PettingZoo's `ParallelEnv`, by the usual name; see the class."""
+    """Return a mission as PettingZoo's `ParallelEnv`, by the usual name; see the class.
+
+    Args:
+        mission: The mission, or its task.
+        **options: As of `SwarmParallelEnv`: `render_mode`, and the options of `make_batch`.
+
+    Returns:
+        The environment; `reset` begins its first mission.
+
+    Raises:
+        ValueError: If a value is unknown or out of range, or does not go with another.
+        TypeError: If an option is unknown, or a component cannot be called.
+
+    Example:
+        >>> env = parallel_env("random-walk", num_robots=10, reward="credit")
+    """
     return SwarmParallelEnv(mission, **options)

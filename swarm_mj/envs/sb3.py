@@ -36,8 +36,6 @@ def make_vec_env(
 ) -> SwarmVecEnv:
     """Return B missions for stable-baselines3, with `action_masks()` for `MaskablePPO`.
 
-    Raises ValueError if a value is unknown or out of range, TypeError if an option is unknown.
-
     Args:
         mission: The mission, or its task.
         num_missions: B.
@@ -47,6 +45,18 @@ def make_vec_env(
             these; None draws the first ones, too. A model with a `seed` of its own begins with
             that mission instead: stable-baselines3 seeds its environment with it.
         **options: As of `make_batch`: the reward, the features, and any field of `Mission`.
+
+    Returns:
+        The environments: B N if an agent is a robot, or B if it is a team.
+
+    Raises:
+        ValueError: If a value is unknown or out of range, or the reward "credit", which is each
+            robot's own, is to pay a team.
+        TypeError: If an option is unknown.
+        gymnasium.error.Error: If the seed is not an integer of 0 or more.
+
+    Example:
+        >>> model = PPO("MultiInputPolicy", make_vec_env("flocking", 4, num_robots=10, seed=1))
     """
     check_choice("agent", agent, AGENTS)
     for name in {"n_envs", "num_envs"} & options.keys():
@@ -65,13 +75,24 @@ def make_vec_env(
 def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
     """Store a trained actor as a policy that `swarm-mj fly --policy FILE` flies; return the file.
 
-    It holds the network's weights, no code and no pickle; the model itself is not kept. A file at
-    `path` is replaced; `.safetensors` is appended unless it ends so.
+    It holds the network's weights, no code and no pickle; the model itself is not kept.
 
-    The model is PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
-    of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its rewards. A
-    model that was loaded needs it again: `PPO.load(path, env=env)`. Raises ValueError if the model
-    is another, and OSError if the file cannot be written.
+    Args:
+        model: PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
+            of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its
+            rewards. A model that was loaded needs it again: `PPO.load(path, env=env)`.
+        path: The file, which is replaced if it exists; `.safetensors` is appended unless it ends
+            so.
+
+    Returns:
+        The path of the file, with its ending.
+
+    Raises:
+        ValueError: If the model is another, or too large for a policy's file.
+        OSError: If the file cannot be written.
+
+    Example:
+        >>> save_policy(model.learn(100_000), "mine.safetensors")
     """
     batch = _trained_on(model)
     layers = _actor(model)

@@ -228,7 +228,17 @@ def has_own_cost(result: Result) -> bool:
 
 
 def config_of(result: Result) -> dict[str, Any]:
-    """Return everything that a result depends on; raise ValueError if that is no JSON object."""
+    """Return everything that a result depends on.
+
+    Args:
+        result: One row of results, whose column `config` is read.
+
+    Returns:
+        The fields of the mission, the policy and its parameters, by name.
+
+    Raises:
+        ValueError: The column is no JSON object.
+    """
     try:
         return read_json(result.config, dict)
     except ValueError as error:
@@ -445,8 +455,17 @@ def read_results(path: Path) -> list[Result]:
 
     Columns that no result has are ignored, and those that are newer than the file may be missing.
 
+    Args:
+        path: The CSV file.
+
+    Returns:
+        The results, one for each row; an empty cell is None.
+
     Raises:
         ValueError: The file cannot be read as such, or has no rows.
+
+    Example:
+        >>> [result.aoi_mean for result in read_results(Path("results.csv"))]  # [windows]
     """
     try:
         rows = read_rows(path, "results file", MAX_BYTES)
@@ -458,7 +477,15 @@ def read_results(path: Path) -> list[Result]:
 
 
 def write_results(path: Path, results: Iterable[Result]) -> None:
-    """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell."""
+    """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell.
+
+    Args:
+        path: The CSV file.
+        results: The rows, in the order in which they are written.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     write_csv(path, COLUMNS, (asdict(result) for result in results))
 
 

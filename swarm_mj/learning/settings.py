@@ -25,7 +25,33 @@ MAX_DECISIONS = 10**12
 
 @dataclass(frozen=True, kw_only=True)
 class PpoSettings:
-    """PPO, in stable-baselines3's terms; the defaults are those of credit per robot."""
+    """PPO, in stable-baselines3's terms; the defaults are those of credit per robot.
+
+    Args:
+        learning_rate: Of Adam, at the start.
+        decay: By what the learning rate is multiplied every `decay_steps`, from 0 to 1.
+        decay_steps: Optimiser steps between two decays.
+        least_share: The share of `learning_rate` below which it does not decay.
+        num_steps: Windows of each mission in a rollout.
+        num_minibatches: Into how many a rollout is divided.
+        num_epochs: Passes over a rollout.
+        discount: Gamma; 0 makes a packet's credit that of its own window alone.
+        gae_lambda: Lambda of the generalised advantage estimate.
+        clip: By how much the probability ratio may differ from 1.
+        clips_value: Whether values are clipped by the same number.
+        entropy: Weight of the entropy bonus.
+        value: Weight of the value's squared error.
+        max_gradient_norm: The norm to which gradients are clipped.
+        adam_epsilon: Adam's epsilon.
+        silent_share: The share of silent rows that training keeps, where they have no credit.
+
+    Raises:
+        ValueError: A value is not of its kind, or out of its range.
+
+    Example:
+        >>> PpoSettings(learning_rate=3e-4).num_epochs
+        2
+    """
 
     learning_rate: float = setting(
         1e-3,
@@ -101,8 +127,34 @@ ROBOTS_NETWORK = GnnShape(
 class Training:
     """A training run: the same settings make the same policy on the same machine.
 
-    The defaults are those of credit per robot, made to learn in minutes. Raises ValueError for
-    values that are unknown, out of range, or do not go with each other.
+    The defaults are those of credit per robot, made to learn in minutes.
+
+    Args:
+        credit_assignment: "robot", each paid for what its own packets changed, or "team", one
+            reward for all.
+        mission: What is flown, but for the team's size.
+        robots: Sizes of the team, from 2 to 200; several are trained on together.
+        features: What the network sees of each teammate: the name of a feature set, or
+            `module:Name`.
+        network: The layers of the network that acts.
+        shares_trunk: Whether values are one more output of the same network.
+        silence_logit: Added to the logit of silence, except in a robot's own turn.
+        reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
+        ppo: Settings of PPO.
+        missions: Missions flown side by side.
+        groups: Groups of missions that end at different times.
+        seed: The same seed is the same policy.
+        evaluate_every: Team decisions between two evaluations.
+        held_out: Missions of an evaluation, of each team size.
+        components: Channel, controller and scene, where they are not the mission's own.
+        threads: Torch's threads.
+
+    Raises:
+        ValueError: A value is unknown, out of range, or does not go with another.
+
+    Example:
+        >>> Training(mission=paper("stationary"), robots=(10, 20)).drops_silence
+        True
     """
 
     credit_assignment: CreditAssignment = common_setting(
@@ -188,8 +240,22 @@ class Training:
 def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
     """Return the usual settings of credit per `robot` or per `team`, the paper's way (III-C).
 
-    The mission's preset says whose way, where they differ; `dataclasses.replace` changes some.
-    Raises ValueError for values that are unknown or out of range.
+    Args:
+        credit: "robot" or "team".
+        mission: What is flown; its preset says whose way of credit per team, the paper's text or
+            the authors' code.
+        robots: Sizes of the team; several are trained on together.
+        seed: The same seed is the same policy.
+
+    Returns:
+        The settings; `dataclasses.replace` changes some.
+
+    Raises:
+        ValueError: A value is unknown or out of range.
+
+    Example:
+        >>> usual_settings("team", paper("flocking"), [40]).missions
+        32
     """
     check_value(Training.__dataclass_fields__["credit_assignment"], credit)
     usual = Training(mission=mission, robots=tuple(robots), seed=seed)

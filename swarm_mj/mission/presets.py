@@ -77,9 +77,24 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:
 
 
 def indoor(task: Task = "random-walk", **overrides: Any) -> Mission:
-    """Return a mission on an office floor; arguments and errors as of `paper`.
+    """Return a mission on an office floor.
 
     Free space between light walls is the multi-wall model (COST 231 1999, section 4.7).
+
+    Args:
+        task: What the robots do: "stationary", "random-walk" or "flocking".
+        **overrides: Fields of `Mission`, which says their units and ranges.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: A field is outside its range, or does not go with another.
+        TypeError: A field is unknown.
+
+    Example:
+        >>> indoor("random-walk", num_robots=20).arena
+        'rooms'
     """
     floor = Mission(
         preset="indoor",
@@ -95,10 +110,25 @@ def indoor(task: Task = "random-walk", **overrides: Any) -> Mission:
 
 
 def urban(task: Task = "random-walk", **overrides: Any) -> Mission:
-    """Return a mission in street canyons between blocks; arguments and errors as of `paper`.
+    """Return a mission in street canyons between blocks.
 
     UMi: 32.4 + 21 log10(d) + 20 log10(f) is free space up to 1 m. A block of 25 dB then is its
     loss without line of sight: 23 dB more at 200 m.
+
+    Args:
+        task: What the robots do: "stationary", "random-walk" or "flocking".
+        **overrides: Fields of `Mission`, which says their units and ranges.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: A field is outside its range, or does not go with another.
+        TypeError: A field is unknown.
+
+    Example:
+        >>> urban("random-walk", num_robots=20).arena
+        'blocks'
     """
     streets = Mission(
         preset="urban",
@@ -117,9 +147,24 @@ def urban(task: Task = "random-walk", **overrides: Any) -> Mission:
 
 
 def open_field(task: Task = "random-walk", **overrides: Any) -> Mission:
-    """Return a mission on an open field; arguments and errors as of `paper`.
+    """Return a mission on an open field.
 
     Two-ray ground (Rappaport 2002), antennas as high as 3GPP's users carry theirs; K of RMa.
+
+    Args:
+        task: What the robots do: "stationary", "random-walk" or "flocking".
+        **overrides: Fields of `Mission`, which says their units and ranges.
+
+    Returns:
+        The mission.
+
+    Raises:
+        ValueError: A field is outside its range, or does not go with another.
+        TypeError: A field is unknown.
+
+    Example:
+        >>> open_field("random-walk", num_robots=20).path_loss
+        'two-ray'
     """
     field = Mission(
         preset="open-field",

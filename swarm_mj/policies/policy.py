@@ -63,7 +63,14 @@ class Policy:
         raise NotImplementedError(f"{cls.__name__} does not say how a mission's is made")
 
     def window(self, mission: Mission) -> WindowProtocol:
-        """Return what the robots do in a window: by Alg. 1 they request, and respond."""
+        """Return what the robots do in a window: by Alg. 1 they request, and respond.
+
+        Args:
+            mission: It says whether a silent robot notes having addressed itself (Eq. 7).
+
+        Returns:
+            The form of a window, which `Swarm` plays.
+        """
         return RequestResponse(silence_is_attempt=mission.silence_is_attempt)
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:  # noqa: ARG002
@@ -83,6 +90,9 @@ class Policy:
 
         Args:
             mission: Its team, area and bit rate say how large packets are and may be.
+
+        Returns:
+            The packet: T, M and P of as many robots as fit into a slot, and the payload's fields.
 
         Raises:
             ValueError: If a slot holds not even one entry beside the payload.
@@ -144,8 +154,8 @@ class DecentralisedPolicy(Policy, ABC):
                 read-only; b counts missions and i robots.
 
         Returns:
-            Indices of robots: at [b, i] the one that robot i addresses, or i itself for silence.
-            Row [b, i] may depend on view [b, i] only.
+            Indices of robots, [B N]: at [b, i] the one that robot i addresses, or i itself for
+            silence. Row [b, i] may depend on view [b, i] only.
         """
 
 
@@ -162,7 +172,15 @@ class BroadcastPolicy(DecentralisedPolicy):
     """
 
     def window(self, mission: Mission) -> WindowProtocol:
-        """Return what the robots do in a window: they broadcast twice, unanswered."""
+        """Return what the robots do in a window: they broadcast twice, unanswered.
+
+        Args:
+            mission: It says whether a silent robot notes having addressed itself (Eq. 7), and
+                whether its half-duplex rule makes a broadcast name an addressee.
+
+        Returns:
+            The form of a window, which `Swarm` plays.
+        """
         return DoubleBroadcast(
             silence_is_attempt=mission.silence_is_attempt,
             needs_addressees=mission.half_duplex == "eavesdroppers",
@@ -180,7 +198,17 @@ class BroadcastPolicy(DecentralisedPolicy):
         """
 
     def recipients(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        """Return `BROADCAST` for robots that transmit; ValueError if `transmits` is not bools."""
+        """Return `BROADCAST` for robots that transmit in the next slot, by `transmits`.
+
+        Args:
+            views: What each robot knows, as in `DecentralisedPolicy.recipients`.
+
+        Returns:
+            At [b, i], of [B N], `BROADCAST`, or i itself for silence.
+
+        Raises:
+            ValueError: If `transmits` does not return an array of bool, [B N].
+        """
         transmits = np.asarray(self.transmits(views))
         shape = views.silence.shape
         if transmits.shape != shape or transmits.dtype != np.bool_:
@@ -237,9 +265,10 @@ class CentralisedPolicy(Policy, ABC):
 
         Args:
             views: What each robot knows, as in `DecentralisedPolicy.recipients`.
-            states: Where all robots truly are and how fast: `position_m` and `velocity_mps`
-                [missions, robots, 2].
+            states: Where all robots truly are [m] and how fast [m/s]: `position_m` and
+                `velocity_mps` [B N 2].
 
         Returns:
-            Indices of robots: at [b, i] the one that robot i addresses, or i itself for silence.
+            Indices of robots, [B N]: at [b, i] the one that robot i addresses, or i itself for
+            silence.
         """

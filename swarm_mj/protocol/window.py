@@ -132,7 +132,20 @@ def broadcast(
 ) -> Phase:
     """Play a single slot, whose packets nobody answers (IV-C): a transmission phase alone.
 
-    Arguments and errors are those of `window`; `now` is when the slot begins.
+    Args:
+        buffers: The robots' buffers at t; they are written in place.
+        states: Where the robots truly are, and what they observe of themselves; fixed meanwhile.
+        recipient: Whom each robot addresses, [B N], from 0 to N - 1, or `BROADCAST`; itself is
+            silence.
+        channel: Who decodes whom. Its packets must arrive in the slot in which they were sent.
+        now: t when the slot begins, [B] [windows].
+        silence_is_attempt: Whether a silent robot notes having addressed itself (Eq. 7).
+
+    Returns:
+        The slot's phase: its recipients, and the senders decoded.
+
+    Raises:
+        ValueError: If a user's own channel answers what is no robot, or a robot that is silent.
     """
     t = now + SLOT_WINDOWS
     observe_self(buffers, states, t)
@@ -160,7 +173,14 @@ def transmit(
 
 
 def respondents(transmission: Phase) -> Int[np.ndarray, "B N"]:
-    """Return whom each robot answers: the sender it decoded, if that packet was meant for it."""
+    """Return whom each robot answers: the sender it decoded, if that packet was meant for it.
+
+    Args:
+        transmission: The recipients and the senders decoded in a window's first slot.
+
+    Returns:
+        Recipients of the response phase, [B N], from 0 to N - 1; itself is silence.
+    """
     answered = np.empty_like(transmission.recipient)
     answer(transmission.recipient, transmission.heard, answered)
     return answered

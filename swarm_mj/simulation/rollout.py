@@ -56,14 +56,15 @@ def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord
     """Fly the missions, one window at a time, for the caller to watch, record or break off.
 
     Args:
-        swarm: The missions, at their start.
+        swarm: The B missions, at their start.
         policy: It is started first; None is the one that was started already.
 
     Yields:
-        What each window cost, when the swarm stands at the end of that window.
+        What each window cost, each number [B], when the swarm stands at the end of that window.
 
     Raises:
-        ValueError: If the swarm has flown already; and as `Swarm.step` does.
+        ValueError: If the swarm has flown already; and as `Swarm.step` does. As of any generator,
+            this is raised when the first window is asked for.
         TypeError: If it is no swarm; and as `Swarm.step` does.
 
     Example:

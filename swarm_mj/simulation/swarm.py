@@ -249,7 +249,17 @@ class Swarm:
         self._policy_is_ours = is_ours(policy)
 
     def decide(self) -> Int[np.ndarray, "B N"]:
-        """Return whom each robot addresses next, by the policy that was started."""
+        """Return whom each robot addresses next, by the policy that was started.
+
+        It moves no robot and sends no packet. `step` checks the answer; here it is the policy's as
+        it is.
+
+        Returns:
+            Recipients, [B N]: from 0 to N - 1, itself for silence, or `BROADCAST`.
+
+        Raises:
+            ValueError: If no policy was started.
+        """
         policy = self.policy
         is_trusted = self._policy_is_ours
         views = self.views if is_trusted else self.views.copy()
@@ -258,7 +268,18 @@ class Swarm:
         return policy.recipients(views)
 
     def move(self) -> RobotStates:
-        """Move the robots through one window, by their controller and the physics."""
+        """Move the robots through one window, by their controller and the physics.
+
+        The clock and the buffers stay as they are: those are for `step`, which calls this.
+
+        Returns:
+            The states afterwards: positions [m] and velocities [m/s], [B N 2] each, who is active,
+            and, where localisation errs, the positions that robots observe of themselves.
+
+        Raises:
+            ValueError: If the controller's accelerations are not one finite vector per robot, [B N
+                2].
+        """
         wanted_mps2 = self.controller(self._read_only, self._states_for(self._controller_is_ours))
         states = self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
         return self._observed(states)
@@ -341,7 +362,14 @@ class Swarm:
         return recipient
 
     def task_cost(self) -> TaskCost | None:
-        """Return what the task costs now, where the controller has a cost."""
+        """Return what the task costs now, where the controller has a cost.
+
+        Returns:
+            The cost's name and unit, and its value in each mission, [B]; None if there is none.
+
+        Raises:
+            ValueError: If the controller's cost is not one number of 0 or more for each mission.
+        """
         controller = self._costed
         if controller is None:
             return None

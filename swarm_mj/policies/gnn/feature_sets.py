@@ -44,7 +44,17 @@ def make_extractor(features: str, mission: Mission) -> FeatureExtractor:
 
 
 def num_features(features: str) -> int:
-    """Return the count of a node's numbers in a feature set; raises as `make_extractor`."""
+    """Return the count of a node's numbers in a feature set.
+
+    Args:
+        features: One of `FEATURE_SETS`, or a user's own, `module:Name`, after `load_features`.
+
+    Returns:
+        F, the numbers that describe one teammate.
+
+    Raises:
+        ValueError: The name is unknown, or a user's own that was not loaded.
+    """
     return len(_feature_set(features).names)
 
 
@@ -98,8 +108,18 @@ def _feature_set(features: str) -> type[FeatureExtractor]:
 def load_features(features: str) -> None:
     """Import a user's own feature set, `module:Name`, which from then on has that name.
 
-    That runs its code, so the name must be one that the user gave, and none from a file. Raises
-    ValueError if it cannot be loaded, or is no class of a `FeatureExtractor` with names.
+    That runs its code, so the name must be one that the user gave, and none from a file.
+
+    Args:
+        features: `module:Name` of a `FeatureExtractor`'s class that has `names`; the current folder
+            is searched first.
+
+    Raises:
+        ValueError: It cannot be loaded, or is no class of a `FeatureExtractor` with names.
+
+    Example:
+        >>> load_features("my_features:Mine")
+        >>> num_features("my_features:Mine")
     """
     own = load("features", features)
     if not isinstance(own, type) or not issubclass(own, FeatureExtractor):
