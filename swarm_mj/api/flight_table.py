@@ -60,10 +60,10 @@ def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> 
 
     complete = numbers["complete_window"]
     if complete is None:
-        told = f"never; {numbers['heard_share']:.0%} of pairs at the end"
+        shown_how = f"never; {numbers['heard_share']:.0%} of pairs at the end"
     else:
-        told = f"after {_windows(complete, mission, 0)}"
-    rows["everyone had heard of everyone"] = told
+        shown_how = f"after {_windows(complete, mission, 0)}"
+    rows["everyone had heard of everyone"] = shown_how
 
     hops = numbers["hops_mean"]
     rows["radio hops that news travelled, mean"] = f"{hops:.2f}" if hops else "-"

@@ -12,7 +12,7 @@ from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.simulation.components import GROUP, SHOWN_AS, Components
-from swarm_mj.system.fields import About, about_of, as_typed, kind_of, setting
+from swarm_mj.system.fields import Meaning, about_of, as_typed, kind_of, setting
 
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
@@ -122,7 +122,7 @@ def mission_flags(mission: Mission) -> str:
     return " ".join(flags)
 
 
-def about_option(spec: Field[Any]) -> About:
+def about_option(spec: Field[Any]) -> Meaning:
     """Return what the help says of a field of `Mission`: what it says itself, and what is there."""
     about = about_of(spec)
     if spec.name == "arena":  # the mission's room comes before the one that knows the arenas

@@ -17,7 +17,7 @@ from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.system import fields as settings
 from swarm_mj.system.exit_codes import BAD_INPUT
-from swarm_mj.system.fields import About, about_of
+from swarm_mj.system.fields import Meaning, about_of
 
 Value = TypeVar("Value")
 
@@ -98,7 +98,7 @@ class Option:
     """A field as an option of the command line."""
 
     spec: Field[Any]
-    about: About  # what the help says of it: the field's own, unless the command says otherwise
+    about: Meaning  # what the help says of it: the field's own, unless the command says otherwise
     place: str  # what its value is called until it is built into the command's dataclass
     is_many: bool = False  # whether it takes several values
     is_nested: bool = False  # whether it is part of another field, which does without it
@@ -112,7 +112,7 @@ class Option:
 
 @dataclass(frozen=True)
 class Nested:
-    """What fills a field by several options."""
+    """A field that several options fill."""
 
     options: Callable[[], Iterable[Option]]
     build: Callable[[dict[str, Any]], Any]

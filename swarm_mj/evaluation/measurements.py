@@ -1,4 +1,4 @@
-"""What the columns of results are made of: a policy's missions in one regime, flown."""
+"""A policy's missions in one regime, flown: the columns of results are made of these."""
 
 import json
 import math
@@ -84,7 +84,7 @@ class Measurements:
 
     @property
     def aoi_floor(self) -> Sample:
-        """What instant sharing within connected parts would leave [windows]; nan is unknown."""
+        """The age that instant sharing within connected parts leaves [windows]; nan is unknown."""
         return Sample(self.costs.aoi_floor)
 
     @cached_property
@@ -149,7 +149,7 @@ class Measurements:
 
     @property
     def bytes_per_second(self) -> float:
-        """What the team sends, responses too."""
+        """The bytes that the team sends, responses too."""
         sent_bytes = self.packet_bytes * float(self.costs.packets_transmitted.sum())
         return sent_bytes / (self.num_windows * self.mission.window_s)
 

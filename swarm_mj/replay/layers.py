@@ -39,7 +39,7 @@ class View(Entity):
 
     @property
     def contents(self) -> str:
-        """What the view shows, in rerun's words."""
+        """The contents of the view, in rerun's words."""
         return f"/{self.path}/**"
 
 
@@ -252,8 +252,8 @@ SCENE_LINKS: dict[LinkKind, Lines3D] = {
 }
 
 
-class Sample(NamedTuple):
-    """What the legend shows of one layer of the map."""
+class LegendSample(NamedTuple):
+    """The legend's sample of one layer of the map."""
 
     text: str
     layer: Flat
@@ -263,17 +263,17 @@ class Sample(NamedTuple):
     pieces: Float[np.ndarray, "P 2"] = WHOLE  # that a line is drawn in
 
 
-def legend(log: Log) -> list[list[Sample]]:
+def legend(log: Log) -> list[list[LegendSample]]:
     """Return the legend's rows: the radio, what else is shown, mismatched links."""
     packets = _packet_samples(log)
     others = []
     if log.has_motion:
-        others.append(Sample("heading", HEADINGS))
-        others.append(Sample(f"r{log.ego}'s belief", BELIEF, radius=0.8))
-    others.append(Sample(f"r{log.ego}'s tree", PARENTS))
+        others.append(LegendSample("heading", HEADINGS))
+        others.append(LegendSample(f"r{log.ego}'s belief", BELIEF, radius=0.8))
+    others.append(LegendSample(f"r{log.ego}'s tree", PARENTS))
     # Beyond free space, the circle is what the range would be.
     text = "range in\nfree space" if log.is_compared else "radio range"
-    reach = Sample(text, RANGE, radius=2.0)
+    reach = LegendSample(text, RANGE, radius=2.0)
     if log.facts.is_broadcast:
         packets.append(reach)
     else:  # the four fates of addressed packets fill their row
@@ -284,28 +284,28 @@ def legend(log: Log) -> list[list[Sample]]:
     return rows
 
 
-def _packet_samples(log: Log) -> list[Sample]:
+def _packet_samples(log: Log) -> list[LegendSample]:
     if log.facts.is_broadcast:
-        return [Sample("transmits", TRANSMITTERS), Sample("is heard by", HEARD)]
+        return [LegendSample("transmits", TRANSMITTERS), LegendSample("is heard by", HEARD)]
     return [
-        Sample("delivered", DELIVERED),
-        Sample("lost", LOST, share=palette.LOST_SHARE),
-        Sample("answered", ANSWERED),
-        Sample("overheard", OVERHEARD),
+        LegendSample("delivered", DELIVERED),
+        LegendSample("lost", LOST, share=palette.LOST_SHARE),
+        LegendSample("answered", ANSWERED),
+        LegendSample("overheard", OVERHEARD),
     ]
 
 
-def _link_samples(log: Log) -> list[Sample]:
+def _link_samples(log: Log) -> list[LegendSample]:
     if not log.is_compared:
         return []
     samples = []
     links = by_kind(log.mismatch.links)
     if len(links["too_weak"]) > 0:
         colour = palette.MISMATCH["too_weak"]
-        samples.append(Sample("believed,\ntoo weak", TOO_WEAK, colour=colour, pieces=DASHES))
+        samples.append(LegendSample("believed,\ntoo weak", TOO_WEAK, colour=colour, pieces=DASHES))
     if len(links["unbelieved"]) > 0:
         colour = palette.MISMATCH["unbelieved"]
-        samples.append(Sample("works,\nunbelieved", UNBELIEVED, colour=colour))
+        samples.append(LegendSample("works,\nunbelieved", UNBELIEVED, colour=colour))
     if np.any(log.is_cut_off):
-        samples.append(Sample(f"cut off\nfrom r{log.ego}", CUT_OFF))
+        samples.append(LegendSample(f"cut off\nfrom r{log.ego}", CUT_OFF))
     return samples

@@ -14,7 +14,7 @@ from rerun.encodings import EntityPathLike
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.charts import STATES_SIZE, TREE_SIZE, Plot, plots
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.layers import Arrows, Lines, Lines3D, Points, Rings, Sample, legend
+from swarm_mj.replay.layers import Arrows, LegendSample, Lines, Lines3D, Points, Rings, legend
 from swarm_mj.replay.recorder import Log, in_matrix
 from swarm_mj.replay.rerun_log import TIMELINE, RerunLog
 from swarm_mj.replay.stage import square_m
@@ -215,7 +215,7 @@ def _row_height(log: Log) -> float:
     return ROW + LINE if log.is_compared else ROW
 
 
-def _sample(sample: Sample, x: float, y: float) -> rr.AsComponents:
+def _sample(sample: LegendSample, x: float, y: float) -> rr.AsComponents:
     """Return a sample in its layer's look, amid this place."""
     layer = sample.layer
     if sample.colour is not None:

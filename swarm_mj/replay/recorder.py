@@ -98,7 +98,7 @@ def check_observer(observer: int, num_robots: int) -> None:
 
 
 class _Row(NamedTuple):
-    """What one window leaves of a mission, or, of all windows, arrays with their axis first."""
+    """A mission's window as it is recorded, or, of all windows, arrays with their axis first."""
 
     position_m: Float[np.ndarray, "*T N 2"]
     velocity_mps: Float[np.ndarray, "*T N 2"]
@@ -116,7 +116,7 @@ class _Row(NamedTuple):
 
 
 class _Compared(NamedTuple):
-    """What comes from snapshots of the radio, of which free space has none."""
+    """The part from snapshots of the radio, of which free space has none."""
 
     is_cut_off: Bool[np.ndarray, "T N"]
     mismatch: links.LinkMismatch

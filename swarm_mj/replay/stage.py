@@ -55,7 +55,7 @@ def _widen_floor(spec: MjSpec, ground: Ground) -> None:
     low_m = np.min(ground.centre_m, axis=0)
     high_m = np.max(ground.centre_m, axis=0)
     for geom in spec.geoms:
-        if geom.name == "floor":  # a scene of one's own may have none
+        if geom.name == "floor":  # a scene of the user's may have none
             geom.pos = [*(low_m + high_m) / 2.0, 0.0]
             geom.size = [*(high_m - low_m) / 2.0 + 1.5 * ground.reach_m, 1.0]
 

@@ -32,7 +32,7 @@ ABOUT = "about"  # the one key of a field's metadata
 
 @dataclass(frozen=True)
 class Switch:
-    """What another field must be for a field to count: a number above 0, or in one state."""
+    """The state of another field for a field to count: a number above 0, or a choice."""
 
     field: Field[Any]
     state: str = ""  # one of its choices; "" is any number above 0
@@ -49,8 +49,8 @@ class Switch:
 
 
 @dataclass(frozen=True, kw_only=True)
-class About:
-    """What a field says of itself; `setting` explains each of these."""
+class Meaning:
+    """The meaning of a field, as `setting` explains it."""
 
     help: str = ""
     label: str = ""
@@ -126,7 +126,7 @@ def setting(
     Raises:
         TypeError: A range has one end only.
     """
-    about = About(
+    about = Meaning(
         help=help,
         label=label,
         unit=unit,
@@ -171,9 +171,9 @@ def set_to(switch: object, state: str) -> Switch:
     return Switch(switch, state)
 
 
-def about_of(spec: Field[Any]) -> About:
+def about_of(spec: Field[Any]) -> Meaning:
     """Return what a dataclass's field says of itself; nothing, if it is no `setting`."""
-    return spec.metadata.get(ABOUT, About())
+    return spec.metadata.get(ABOUT, Meaning())
 
 
 def same_as(owner: type[Any], name: str, *, is_common: bool | None = None) -> Any:  # noqa: ANN401 - as the other field's value

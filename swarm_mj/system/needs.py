@@ -1,4 +1,4 @@
-"""Whether what a command needs of memory and disk is left on this machine: asked at the door.
+"""Memory and disk: whether this machine has left what a command needs, asked before the work.
 
 What is needed, those know who fill it: `simulation.memory`, `replay.recorder`, `learning`.
 """

@@ -141,7 +141,7 @@ def owned(path: Path) -> Iterator[None]:
     try:
         yield
     finally:
-        # Before it is unlocked: whoever waits for it sees that it has no name any more.
+        # Before it is unlocked: a process that waits for it sees that it has no name any more.
         hidden.unlink(missing_ok=True)
         lock.release()
         with suppress(OSError):  # until one is not empty

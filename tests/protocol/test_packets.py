@@ -9,7 +9,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.buffers import NEVER, NO_PARENT, empty_buffers, merge
+from swarm_mj.protocol.buffers import ABSENT, NEVER, NO_PARENT, empty_buffers, merge
 from swarm_mj.protocol.costs import mean_hops
 from swarm_mj.protocol.packets import (
     check_whole,

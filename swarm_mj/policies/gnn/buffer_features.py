@@ -21,7 +21,7 @@ from swarm_mj.system.compiled import compiled
 
 
 class BufferNode:
-    """What a node tells of a teammate, in the network's order: T, M, P and L of one robot's buffer.
+    """A node, in the network's order: T, M, P and L of one robot's buffer.
 
     The shares and the counts of staler robots are the same in all nodes of a graph.
     """

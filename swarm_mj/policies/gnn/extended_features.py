@@ -26,7 +26,7 @@ TEAM = 40.0  # robots that count as 1
 
 
 class ExtendedNode:
-    """What a node tells of a teammate, in the network's order.
+    """A node's knowledge of a teammate, in the network's order.
 
     A node of the robot itself carries what concerns all of its neighbours.
     """

@@ -16,7 +16,7 @@ import numpy as np
 
 
 class Feature(NamedTuple):
-    """What a field of a node tells."""
+    """The meaning of a node's field."""
 
     name: str  # in a few words; stored policies keep it
     needs_turns: bool = False  # whether it follows from an order of the team and from the clock

@@ -96,7 +96,7 @@ def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> N
 
 
 class PaperNode:
-    """What a node tells of a teammate, in the network's order."""
+    """A node's knowledge of a teammate, in the network's order."""
 
     is_oneself: Annotated[float, Feature("is oneself")]
     is_known: Annotated[float, Feature("is known")]
@@ -137,7 +137,7 @@ class PaperFeatures(FeatureExtractor):
 
 
 class ReferenceNode:
-    """What a node tells of a teammate, in the order of the authors' code."""
+    """A node's knowledge of a teammate, in the order of the authors' code."""
 
     timestamp: Annotated[float, Feature("T - t")]
     zero: Annotated[float, Feature("zero")]
