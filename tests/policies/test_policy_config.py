@@ -24,7 +24,7 @@ def test_a_config_comes_back_as_it_was(features, commit):
 ABSENT = object()
 LACKING = [
     (key, ABSENT, f"missing required field `{key.rpartition('.')[2]}`")
-    for key in ("network", "features", "commit", "network.latent", "network.is_linear")
+    for key in ("network", "features", "commit", "network.num_features")
 ]
 
 

@@ -57,14 +57,14 @@ def test_what_is_there_of_this_commit_is_kept(made, capsys, monkeypatch):
     assert "is there; --force flies it again" in capsys.readouterr().err
     assert (made / "classics.csv").stat().st_mtime_ns == before
     seen = []
-    monkeypatch.setattr(program, "fly", lambda *given: seen.append(given) or INTERRUPTED)
+    monkeypatch.setattr(program, "run_study", lambda *given: seen.append(given) or INTERRUPTED)
     monkeypatch.setattr(program, "commit", lambda: "of another code")
     assert fly(made) == INTERRUPTED
     assert len(seen) == 1
 
 
 def test_an_interrupted_study_leaves_no_table(tmp_path, monkeypatch):
-    monkeypatch.setattr(program, "fly", lambda *_: INTERRUPTED)
+    monkeypatch.setattr(program, "run_study", lambda *_: INTERRUPTED)
     assert fly(tmp_path) == INTERRUPTED
     assert not list(tmp_path.glob("*.csv"))
 
