@@ -3,7 +3,6 @@
 from dataclasses import fields
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.presets import NEEDED
 from swarm_mj.mission.specification import CHANNEL
 from swarm_mj.system.fields import about_of
 
@@ -23,7 +22,7 @@ def other_values(name):
 
 def counting(name):
     """The fields of a mission in which a number counts."""
-    if name not in NEEDED:
+    switch = about_of(SPECS[name]).counts_with
+    if switch is None:
         return {}
-    effect, state = NEEDED[name]
-    return {effect: state or other_values(effect)[0]}
+    return {switch.name: switch.state or other_values(switch.name)[0]}

@@ -21,8 +21,6 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.user_code import one_line_each
 
-TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")  # of `costs.Packets`
-
 
 @dataclass(frozen=True, kw_only=True)
 class Batch:
@@ -87,42 +85,64 @@ def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
     missing = np.full(shape[0], np.nan)
     complete = missing
     task_cost = missing
-    sums: dict[str, np.ndarray] = {}
+    # Sums over windows, of each mission.
+    aoi = np.zeros(shape[0])
+    aoi_steady = np.zeros(shape[0])
+    aoi_floor = np.zeros(shape[0])
+    velocity_variance = np.zeros(shape[0])
+    hops = np.zeros(shape[0])
+    task_cost_sum = np.zeros(shape[0])
+    sent = np.zeros(shape[0])
+    transmitted = np.zeros(shape[0])
+    delivered = np.zeros(shape[0])
+    heard = np.zeros(shape[0])
+    receptions = np.zeros(shape[0])
     ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
     for window in flown:
-        costs, states, now = window.costs, swarm.states, swarm.now
+        costs = window.costs
+        states = swarm.states
+        now = swarm.now
         # Always an array, so that the loops below are compiled for one kind of arguments.
         is_on = np.ones(shape, np.bool_) if states.is_active is None else states.is_active
         floor = missing
         if has_floor:
             floor = connectivity_floor(shared, states.position_m, mission.range_m, now, is_on)
         task_cost = costs.task_cost.value if costs.task_cost else missing
-        measured = {
-            "aoi": costs.age_windows,
-            "aoi_steady": costs.age_windows * (now[0] > num_windows - num_steady),
-            "aoi_floor": floor,
-            "velocity_variance": costs.velocity_variance_m2ps2,
-            "hops": window.hops,
-            "task_cost": task_cost,
-        }
+        aoi += costs.age_windows
+        aoi_steady += costs.age_windows * (now[0] > num_windows - num_steady)
+        aoi_floor += floor
+        velocity_variance += costs.velocity_variance_m2ps2
+        hops += window.hops
+        task_cost_sum += task_cost
         packets = costs.packets
-        for name in TOTALS:
-            measured[f"packets_{name}"] = getattr(packets, name)
-        for name, values in measured.items():
-            sums[name] = sums.get(name, 0.0) + values
+        sent += packets.sent
+        transmitted += packets.transmitted
+        delivered += packets.delivered
+        heard += packets.heard
+        receptions += packets.receptions
         complete = np.fmin(complete, np.where(costs.is_complete, now, np.nan))
         count_ages(swarm.buffers.timestamp, now, ages, is_on)
-    found = {"task_cost_last": task_cost, "complete_window": complete}
-    for name, total in sums.items():
-        if name.startswith("packets_"):
-            found[name] = total
-        elif name == "aoi_steady":
-            found[name] = total / num_steady
-        else:
-            found[name] = total / num_windows
-    # A controller's cost may be infinite, which has no mean over missions.
-    finite = {name: np.where(np.isfinite(each), each, np.nan) for name, each in found.items()}
-    return BatchCosts(**finite, ages=ages)
+    return BatchCosts(
+        aoi=_finite(aoi / num_windows),
+        aoi_steady=_finite(aoi_steady / num_steady),
+        aoi_floor=_finite(aoi_floor / num_windows),
+        velocity_variance=_finite(velocity_variance / num_windows),
+        hops=_finite(hops / num_windows),
+        task_cost=_finite(task_cost_sum / num_windows),
+        task_cost_last=_finite(task_cost),
+        complete_window=_finite(complete),
+        packets_sent=_finite(sent),
+        packets_transmitted=_finite(transmitted),
+        packets_delivered=_finite(delivered),
+        packets_heard=_finite(heard),
+        packets_receptions=_finite(receptions),
+        ages=ages,
+    )
+
+
+def _finite(values: Float[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
+    """Return nan in place of infinity: a controller's cost may be, which has no mean."""
+    return np.where(np.isfinite(values), values, np.nan)
 
 
 @compiled()

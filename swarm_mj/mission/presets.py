@@ -1,17 +1,11 @@
 """Missions whose numbers go together: the paper's text, its authors' code, and whole worlds."""
 
 from collections.abc import Callable
-from dataclasses import fields, replace
+from dataclasses import replace
 from typing import Any
 
 from swarm_mj.mission.specification import OPEN, Mission, Task
-from swarm_mj.system.fields import about_of, check_value
-
-NEEDED = {  # the effect that a number counts with; a state of it, if only that
-    spec.name: (switch.name, switch.state or None)
-    for spec in fields(Mission)
-    if (switch := about_of(spec).counts_with)
-}
+from swarm_mj.system.fields import check_value
 
 
 def paper(task: Task = "flocking", **overrides: Any) -> Mission:

@@ -121,16 +121,6 @@ class FreeSpaceRadio:
         """Power received over one metre [mW]; free space scales it by 1/d² (Eqs. 1-2)."""
         return self.power_mw * channel_gain(path_loss_db(1.0, self.frequency_hz))
 
-    @cached_property
-    def rule(self) -> tuple[float, float, float, bool]:
-        """The last arguments of `decode_strongest`."""
-        return (
-            self.received_at_1_m_mw,
-            self.noise_mw,
-            self.threshold,
-            self.recipient_hears_while_sending,
-        )
-
     def __call__(
         self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:

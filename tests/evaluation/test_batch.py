@@ -9,7 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from swarm_mj.evaluation.batch import (
-    TOTALS,
     Batch,
     connectivity_floor,
     costs_of,
@@ -25,6 +24,7 @@ from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
 SEEDS = (5, 6, 7)
+TOTALS = ("sent", "transmitted", "delivered", "heard", "receptions")
 
 
 def small(task="random-walk", **overrides):
