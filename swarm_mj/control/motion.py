@@ -130,13 +130,13 @@ def flocking(
     empty the acceleration is 0.
 
     Args:
-        buffers: What each robot knows of the others' velocities, [B N N 2] [m/s], and of whom it
+        buffers: What each robot knows of the others' velocities, [B N N 2], [m/s], and of whom it
             knows anything, [B N N].
-        velocity_mps: The robots' own velocities, [B N 2] [m/s].
+        velocity_mps: The robots' own velocities, [B N 2], [m/s].
         flocking_set: "heard" or "moving".
 
     Returns:
-        The accelerations u, [B N 2] [m/s²]; the physics clips them.
+        The accelerations u, [B N 2], [m/s²]; the physics clips them.
     """
     is_counted = None if flocking_set == "moving" else buffers.is_known
     return _mean_difference(is_counted, buffers.velocity_mps, velocity_mps)

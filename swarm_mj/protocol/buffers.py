@@ -104,7 +104,7 @@ def record_attempt(
         buffers: The robots' buffers, of which L is written.
         recipient: Whom each robot addresses, [B, N]; itself is silence. `BROADCAST` addresses no
             robot.
-        now: t, [B] [windows].
+        now: t, [B], [windows].
         is_active: Who notes anything, [B, N]; None is everyone.
         silence_is_attempt: Whether a silent robot notes having addressed itself.
     """
@@ -132,7 +132,7 @@ def merge(
     Args:
         buffers: The robots' buffers, written in place.
         heard: The sender that each robot decoded, [B, N]; itself is nobody.
-        sent: T of the entries in each robot's packet, [B, N, N] [windows], `ABSENT` for those that
+        sent: T of the entries in each robot's packet, [B, N, N], [windows], `ABSENT` for those that
             it left out; None is the whole buffer.
     """
     merge_newer(

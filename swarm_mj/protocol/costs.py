@@ -44,11 +44,11 @@ def age_of_information(
 
     Args:
         buffers: What the robots know.
-        now: t, [B] [windows].
+        now: t, [B], [windows].
         is_active: Whose pairs count, [B N], at least one robot's in each mission; None is all.
 
     Returns:
-        The age, [B] [windows], and whether all robots know all, [B].
+        The age, [B], [windows], and whether all robots know all, [B].
     """
     age = np.empty(len(now))
     is_complete = buffers.is_granted.copy()
@@ -178,7 +178,7 @@ def window_costs(
         buffers: What the robots know after the window.
         states: Where they are after it, and who is active.
         phases: Whom they addressed and decoded in its two slots.
-        now: t after it, [B] [windows].
+        now: t after it, [B], [windows].
         is_broadcast: Whether both slots hold broadcasts, or the second answers the first.
         task_cost: What the robots' own task costs after it, if it has a cost.
     """

@@ -43,7 +43,7 @@ class LocalViews:
 
     Args:
         buffers: What every robot knows about every other; robot i's is row `[b, i]` of each array.
-        now: t on the synchronised clock, [B] [windows].
+        now: t on the synchronised clock, [B], [windows].
         phases: Whom each robot addressed and heard, slot by slot: of this window, or else of the
             last. Before the first window it is empty.
 
@@ -96,7 +96,7 @@ def window(
         recipient: Whom each robot addresses, from 0 to N - 1, or `BROADCAST`; itself is silence.
         channel: Who decodes whom. Its packets must arrive in the slot in which they were sent; for
             an `AsynchronousChannel` there is `asynchronous_window.window`.
-        now: t when the window begins, [B] [windows].
+        now: t when the window begins, [B], [windows].
         silence_is_attempt: Whether a silent robot notes having addressed itself (Eq. 7).
 
     Returns:
@@ -138,7 +138,7 @@ def broadcast(
         recipient: Whom each robot addresses, [B N], from 0 to N - 1, or `BROADCAST`; itself is
             silence.
         channel: Who decodes whom. Its packets must arrive in the slot in which they were sent.
-        now: t when the slot begins, [B] [windows].
+        now: t when the slot begins, [B], [windows].
         silence_is_attempt: Whether a silent robot notes having addressed itself (Eq. 7).
 
     Returns:

@@ -51,7 +51,7 @@ class Link:
         A single mission needs no axis B, neither here nor in what is returned.
 
         Args:
-            position_m: Where the robots are, [B, N, 2] [m].
+            position_m: Where the robots are, [B, N, 2], [m].
             wants_to_send: Who sends to everyone, [B, N]; or, as integers, whom each robot
                 addresses, itself for silence and -1 for everyone.
 

@@ -59,7 +59,7 @@ class Swarm:
         states: Where the robots truly are, [B N 2] each, and who is active.
         buffers: What the robots know; entry `[b, i, j]` is what i knows about j.
         views: The same as robots see it: read only, with the clock and the last packets.
-        now: t on the synchronised clock, [B] [windows].
+        now: t on the synchronised clock, [B], [windows].
         phases: Whom each robot addressed and decoded, in each slot of the last window.
         talk: How the robots talk over the channel: what `talk_over` chose.
 

@@ -14,7 +14,7 @@ from swarm_mj.cli import main
 from swarm_mj.evaluation.results import COLUMNS
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
-from swarm_mj.system.needs import LIBRARIES
+from swarm_mj.simulation.memory import LIBRARIES
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")

@@ -8,8 +8,8 @@ import pytest
 from swarm_mj.api import flight
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
+from swarm_mj.simulation.memory import FLYING
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.needs import FLYING
 from swarm_mj.system.terminal import quiet_console
 
 
