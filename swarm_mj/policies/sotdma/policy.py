@@ -23,7 +23,8 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.about import Information, Listed, Look, PairMemory, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.sotdma import slot_table
-from swarm_mj.policies.sotdma.frame import Rule, choices_before, chosen, first_slots, frame_slots
+from swarm_mj.policies.sotdma.choices import choices_before, chosen, first_slots
+from swarm_mj.policies.sotdma.frame import Rule, frame_slots
 from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
@@ -128,28 +129,54 @@ class SotdmaTeam:
 
         Before the first frame these are the robots in turn; `draw` is on [0, 1), for contention.
         """
-        rule = self._rule
-        order = self._order
-        slot = round(view.now / SLOT_WINDOWS)
-        if self._first_slot is None:
-            self._first_slot = slot + rule.first_rounds * len(order)
-        slot -= self._first_slot
+        slot = self._frame_slot(view.now)
         if slot < 0:
             return in_turn
-        is_known = view.is_known | np.eye(len(order), dtype=bool)
+        is_known = view.is_known | np.eye(len(self._order), dtype=bool)
         if self.table is None:
             slots = self._first_slots(view.position_m, is_known)
-            self.table = slot_table.empty_table(slots, rule.num_slots)
-        # A robot observes itself as it transmits, so T says in which slot it last did.
+            self.table = slot_table.empty_table(slots, self._rule.num_slots)
+        known = self._last_transmissions(view)
+        self._read(self.table, view, known, slot)
+        self._choose(self.table, view, is_known, slot)
+        place = place_of(slot, self._rule)
+        if place == NO_PLACE:
+            needs = self._are_in_need(self.table, view, is_known, known, slot)
+            transmits = needs & (draw < self._rule.contention_probability)
+        else:
+            # [i, i] is robot i's own slot.
+            transmits = np.diagonal(self.table.slots) == place
+        self.table.sent[transmits] = slot
+        return transmits
+
+    def _frame_slot(self, now: float) -> int:
+        """Return the slot that begins now, counted from the first frame; before it, below 0."""
+        slot = round(now / SLOT_WINDOWS)
+        if self._first_slot is None:
+            self._first_slot = slot + self._rule.first_rounds * len(self._order)
+        return slot - self._first_slot
+
+    def _last_transmissions(self, view: TeamView) -> Int[np.ndarray, "N N"]:
+        """Return in which slot each robot last transmitted, as each knows; [i, k] is of k."""
+        # A robot observes itself as it transmits, so T is the end of that slot.
         ends = np.rint(SLOTS_PER_WINDOW * view.timestamp).astype(np.int64)
-        known = ends - 1 - self._first_slot
-        table = self.table
+        return ends - 1 - (self._first_slot or 0)
+
+    def _read(
+        self, table: SlotTable, view: TeamView, known: Int[np.ndarray, "N N"], slot: int
+    ) -> None:
+        """Note what the slot before this one taught everyone."""
         if self._reads_packets:
-            slot_table.read_packets(table, view.heard, known, view.parent, slot - 1, rule)
-        slot_table.read_slots(table, known, rule)
-        # Robots whose turns to choose come in this slot: mostly one, or none.
-        first = choices_before(slot, len(order), rule)
-        after = choices_before(slot + 1, len(order), rule)
+            slot_table.read_packets(table, view.heard, known, view.parent, slot - 1, self._rule)
+        slot_table.read_slots(table, known, self._rule)
+
+    def _choose(
+        self, table: SlotTable, view: TeamView, is_known: Bool[np.ndarray, "N N"], slot: int
+    ) -> None:
+        """Let robots choose anew whose turns to choose come in this slot: mostly one, or none."""
+        order = self._order
+        first = choices_before(slot, len(order), self._rule)
+        after = choices_before(slot + 1, len(order), self._rule)
         for turn in range(first, after):
             i = int(order[turn % len(order)])
             table.slots[i, i] = chosen(
@@ -157,21 +184,24 @@ class SotdmaTeam:
                 slots=table.slots[i],
                 announced=table.announced[i],
                 is_known=is_known[i],
-                is_marked=slot_table.marks(table, i, slot, rule),
+                is_marked=slot_table.marks(table, i, slot, self._rule),
                 order=order,
                 slot=slot,
                 power=self._powers(view.position_m[i], is_known[i]),
-                rule=rule,
+                rule=self._rule,
             )
-        place = place_of(slot, rule)
-        if place == NO_PLACE:
-            is_near = is_known & _is_in_range(view.position_m, self._law, rule.threshold)
-            needs = slot_table.are_in_need(table, known, is_near, slot, rule)
-            transmits = needs & (draw < rule.contention_probability)
-        else:
-            transmits = np.diagonal(table.slots) == place
-        table.sent[transmits] = slot
-        return transmits
+
+    def _are_in_need(
+        self,
+        table: SlotTable,
+        view: TeamView,
+        is_known: Bool[np.ndarray, "N N"],
+        known: Int[np.ndarray, "N N"],
+        slot: int,
+    ) -> Bool[np.ndarray, "N"]:
+        """Return who lost a neighbour, or was lost by one, as far as it knows."""
+        is_near = is_known & _is_in_range(view.position_m, self._law, self._rule.threshold)
+        return slot_table.are_in_need(table, known, is_near, slot, self._rule)
 
     def _first_slots(
         self, position_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"]
@@ -180,7 +210,7 @@ class SotdmaTeam:
         slots = np.empty(is_known.shape, dtype=np.int64)
         done = {}  # robots that believe the same need it once
         for i in range(len(slots)):
-            believed = position_m[i].tobytes(), is_known[i].tobytes()
+            believed = (position_m[i].tobytes(), is_known[i].tobytes())
             if believed not in done:
                 power = self._powers(position_m[i], is_known[i])
                 done[believed] = first_slots(self._order, is_known[i], power, self._rule)
