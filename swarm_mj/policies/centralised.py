@@ -18,8 +18,8 @@ from swarm_mj.system.compiled import compiled
 class RoundRobin(CentralisedPolicy):
     """Robots exchange buffers with a base in turn (IV-C).
 
-    TDMA around a base station (Miao et al. 2016): the robot nearest the centre, chosen anew in each
-    window.
+    TDMA around a base station (Miao et al. 2016). The base is the robot nearest the middle of the
+    area, chosen anew in each window, in which one other robot calls it.
     """
 
     about = Listed(
@@ -54,6 +54,7 @@ def _call_base(
     now: Float[np.ndarray, "B"],
     recipient: Int[np.ndarray, "B N"],
 ) -> None:
+    """Write the base as the recipient of the one robot whose turn it is, in each mission."""
     num_robots = recipient.shape[1]
     for b in range(recipient.shape[0]):
         base = 0
@@ -72,7 +73,9 @@ def _call_base(
 class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
     """Robots call their parent in a spanning tree (IV-C).
 
-    Each exchanges buffers with it with probability p.
+    In each window, each exchanges buffers with it with probability p. The tree is the shortest one
+    between true positions when the mission begins; in moving teams of the authors' code, between
+    those of each window.
     """
 
     about = Listed(
@@ -105,19 +108,26 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
 
         The tree may be recomputed in each window. With `root_transmits` the root addresses robot
         N - 1, as in the authors' code, where its missing parent, -1, counts from the end.
+
+        Raises:
+            ValueError: If the probability is no number from 0 to 1.
         """
         super().__init__(probability)
-        self._is_recomputed, self._root_transmits = is_recomputed, root_transmits
+        self._is_recomputed = is_recomputed
+        self._root_transmits = root_transmits
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forget the last mission's tree; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
-        self._parent: np.ndarray | None = None
+        self._parent: np.ndarray | None = None  # [B N], of i or `ROOT`; none before a window
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return the parent, for each robot that draws a transmission."""
         if self._parent is None or self._is_recomputed:
             self._parent = spanning_tree(states.position_m)
-        rootless = np.int64(views.num_robots - 1) if self._root_transmits else views.silence
-        parent = np.where(self._parent == ROOT, rootless, self._parent)
-        return np.where(self._stream.next() < self._probability, parent, views.silence)
+        in_place_of_none = views.silence
+        if self._root_transmits:
+            in_place_of_none = np.int64(views.num_robots - 1)
+        parent = np.where(self._parent == ROOT, in_place_of_none, self._parent)
+        transmits = self._stream.next() < self._probability
+        return np.where(transmits, parent, views.silence)

@@ -72,7 +72,13 @@ class GreedyOracle(CentralisedPolicy):
 def greedy_window(
     timestamp: Float32[np.ndarray, "N N"], now: float, links: Links
 ) -> Int[np.ndarray, "N"]:
-    """Return the recipient of every robot; itself is silence. T and t are before the window."""
+    """Return the recipient of every robot, itself for silence.
+
+    Args:
+        timestamp: T before the window [slots].
+        now: t before the window [slots].
+        links: The true links before their fades.
+    """
     num_robots = timestamp.shape[0]
     sent = timestamp.copy()
     observe_own(sent, now + 1.0)
@@ -154,8 +160,16 @@ def _add_responses(
 ) -> None:
     """Fill `value[r]`: the gain of the first slot and of the responses if r is i's recipient.
 
-    In the first slot, robots decode whom they may have heard with these probabilities. T after it,
-    when responses are sent, and the gain so far, summed over T, are in slots.
+    Args:
+        links: The true links before their fades.
+        i: The new sender.
+        recipient: Of each robot, but for i; itself for silence.
+        is_free: Whether each may become i's recipient.
+        heard: Whom each may decode in the first slot.
+        probability: That it does.
+        after: T after the first slot, when responses are sent [slots].
+        gain: Of the first slot, summed over T [slots].
+        value: Of each r; entries of robots that cannot be i's recipient remain [slots].
     """
     num_robots = recipient.shape[0]
     answers = np.zeros(num_robots, dtype=np.bool_)  # who may decode a packet addressed to it

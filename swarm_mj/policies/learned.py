@@ -29,7 +29,8 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
         self, extractor: FeatureExtractor, *, is_deterministic: bool = False, own_features: str = ""
     ) -> None:
         """Take what makes the features that the network was trained on, and their name if own."""
-        self._extractor, self._own_features = extractor, own_features
+        self._extractor = extractor
+        self._own_features = own_features
         self._is_deterministic = is_deterministic
 
     @property
@@ -39,8 +40,13 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
         digest = hashlib.sha256(repr(made_of).encode())
         for name, values in sorted(weights.items()):
             digest.update(name.encode() + b"\0" + values.tobytes())
-        its = {"is_deterministic": self._is_deterministic, "digest": digest.hexdigest()[:DIGITS]}
-        return its | ({"features": self._own_features} if self._own_features else {})
+        its: dict[str, bool | int | float | str] = {
+            "is_deterministic": self._is_deterministic,
+            "digest": digest.hexdigest()[:DIGITS],
+        }
+        if self._own_features:
+            its["features"] = self._own_features
+        return its
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forget packets; take each mission's generator. Arguments as in `Policy.start`."""
@@ -51,8 +57,10 @@ class LearnedPolicy(DecentralisedPolicy, ABC):
         """Return what each robot's own network draws from its own view."""
         logits = self.logits(self._extractor.graphs(views))
         if self._is_deterministic:
-            return logits.argmax(axis=1).reshape(views.silence.shape)
-        return sample(logits, self._uniform.next().ravel()).reshape(views.silence.shape)
+            recipient = logits.argmax(axis=1)
+        else:
+            recipient = sample(logits, self._uniform.next().ravel())
+        return recipient.reshape(views.silence.shape)
 
     @abstractmethod
     def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
@@ -69,7 +77,8 @@ def sample(
 ) -> Int[np.ndarray, "R"]:
     """Return a draw from each row's Boltzmann distribution, by one number in [0, 1) a row."""
     num_rows, num_nodes = logits.shape
-    chosen, weight = np.zeros(num_rows, dtype=np.int64), np.empty(num_nodes)
+    chosen = np.zeros(num_rows, dtype=np.int64)
+    weight = np.empty(num_nodes)
     for r in range(num_rows):
         highest = logits[r].max()  # taken off before exp, which would overflow
         total = 0.0
@@ -94,7 +103,8 @@ class MlpPolicy(LearnedPolicy):
     ) -> None:
         """Take weights of that shape, and what makes the features that they were trained on."""
         super().__init__(extractor, **options)
-        self._shape, self._weights = shape, weights
+        self._shape = shape
+        self._weights = weights
         self.uses = f"{extractor.uses}, by a trained network"
 
     def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
@@ -103,14 +113,17 @@ class MlpPolicy(LearnedPolicy):
         Each mission is one product of matrices: one product of all would round otherwise for other
         numbers of missions, so a mission would depend on those flown with it.
         """
-        shape, num_robots = self._shape, self._shape.num_robots
+        shape = self._shape
+        num_robots = shape.num_robots
         may_address = graphs.may_address.reshape(-1, num_robots, num_robots)
         node = graphs.node.reshape(*may_address.shape[:2], -1)
         values = np.concatenate([may_address.astype(np.float32), node], axis=2)
         for n in range(len(shape.hidden) + 1):
             if n > 0:
                 values = np.tanh(values) if shape.activation == "tanh" else np.maximum(values, 0.0)
-            values = values @ self._weights[f"{n}.weight"].T + self._weights[f"{n}.bias"]
+            weight = self._weights[f"{n}.weight"]
+            bias = self._weights[f"{n}.bias"]
+            values = values @ weight.T + bias
         logits = values.astype(np.float64).reshape(-1, num_robots)
         return np.where(graphs.may_address, logits, IMPOSSIBLE) if shape.obeys_mask else logits
 

@@ -234,10 +234,21 @@ class TeamView(NamedTuple):
 
 def team_views(views: LocalViews) -> list[TeamView]:
     """Return the views mission by mission, for policies that remember each on its own."""
-    now, buffers = views.now.tolist(), views.buffers
+    buffers = views.buffers
     heard = views.phases[-1].heard if views.phases else views.silence
-    known = buffers.is_known, buffers.timestamp, buffers.position_m, buffers.velocity_mps
-    return [TeamView(*its) for its in zip(now, *known, buffers.parent, heard, strict=True)]
+    each = []
+    for b, now in enumerate(views.now.tolist()):
+        view = TeamView(
+            now=now,
+            is_known=buffers.is_known[b],
+            timestamp=buffers.timestamp[b],
+            position_m=buffers.position_m[b],
+            velocity_mps=buffers.velocity_mps[b],
+            parent=buffers.parent[b],
+            heard=heard[b],
+        )
+        each.append(view)
+    return each
 
 
 class CentralisedPolicy(Policy, ABC):

@@ -134,7 +134,10 @@ def check_fit(network: GnnShape, features: str) -> None:
 
 def _check_num_features(given: int, features: str) -> None:
     # A user's own set is not imported, as its name may stand in a file: it may have any number.
-    if not is_own_set(features) and given != (expected := num_features(features)):
+    if is_own_set(features):
+        return
+    expected = num_features(features)
+    if given != expected:
         raise ValueError(
             f"network.num_features is {given}, but the {features} features are {expected}"
         )
@@ -146,7 +149,8 @@ def model_card(config: GnnConfig | MlpConfig) -> str:
     teams = "Teams of any size fly with it; those much larger than trained on may fare badly."
     flags = [config.training.get("mission", {}).get("task", "TASK")]
     if isinstance(config, MlpConfig):
-        kind, teams = "perceptrons", f"It flies teams of {config.network.num_robots} robots only."
+        kind = "perceptrons"
+        teams = f"It flies teams of {config.network.num_robots} robots only."
         flags.append(f"--robots {config.network.num_robots}")
     if is_own_set(config.features):
         flags.append(f"--features {config.features}")

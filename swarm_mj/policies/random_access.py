@@ -32,7 +32,10 @@ class RandomTransmission(Policy, ABC):
         """Return the policy for a mission, with this probability."""
 
     def __init__(self, probability: float) -> None:
-        """Take the probability in [0, 1], whose meaning is each policy's own, or ValueError."""
+        """Take the probability, whose meaning is each policy's own.
+
+        Raises ValueError if it is no number from 0 to 1.
+        """
         if not isinstance(probability, Real) or not 0.0 <= float(probability) <= 1.0:
             raise ValueError(f"transmission probability must be from 0 to 1, not {probability!r}")
         self._probability = float(probability)  # NumPy's would not go into JSON
@@ -97,7 +100,10 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
         return self._drawn(views) if self._names_addressee else super().recipients(views)
 
     def _drawn(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
-        chance, choice = np.moveaxis(self._stream.next(), 1, 0)
+        """Return an addressee for each robot that draws a transmission, else the robot itself."""
+        draws = self._stream.next()  # [B 2 N]
+        chance = draws[:, 0]
+        choice = draws[:, 1]
         anyone = (choice * views.num_robots).astype(np.int64)
         return np.where(chance < self._probability, anyone, views.silence)
 
@@ -132,13 +138,17 @@ class Aloha(RandomTransmission, BroadcastPolicy):
         return cls(probability, range_m=mission.range_m)
 
     def __init__(self, probability: float, *, range_m: float) -> None:
-        """Take the probability and the distance at which a lone transmission just decodes [m]."""
+        """Take the probability and the distance at which a lone transmission just decodes [m].
+
+        Raises ValueError if the probability is no number from 0 to 1.
+        """
         super().__init__(probability)
         self._range_m = range_m
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return each robot that draws a broadcast."""
-        buffers, everyone_silent = views.buffers, 1.0 - self._probability
+        buffers = views.buffers
+        everyone_silent = 1.0 - self._probability  # the probability of it
         contenders = num_contenders(buffers.is_known, buffers.position_m, self._range_m)
         return self._stream.next() < 1.0 - everyone_silent ** (1.0 / contenders)
 
@@ -157,11 +167,13 @@ def num_contenders(
     for b in range(num_missions):
         for i in range(num_robots):
             place_m = believed_m[b, i]
-            num_known = num_near = 1
+            num_known = 1
+            num_near = 1
             for j in range(num_robots):
                 if is_known[b, i, j] and j != i:
                     num_known += 1
-                    num_near += squared_distance(place_m, j, i) <= range_m * range_m
+                    if squared_distance(place_m, j, i) <= range_m * range_m:
+                        num_near += 1
             contenders[b, i] = num_robots * num_near / num_known
     return contenders
 

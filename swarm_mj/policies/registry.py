@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import Any, TypeGuard
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.about import About, Listed
+from swarm_mj.policies.about import About, Listed, VariantOf
 from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
@@ -27,24 +27,23 @@ from swarm_mj.system.fields import check_kind, did_you_mean, unwrapped
 from swarm_mj.system.packages import asset, need
 from swarm_mj.system.user_code import is_own, make
 
-FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
-PAYLOADS = ("snapshots", "none")  # the planner's own, which at rest is links, or nothing
-
 PACKAGE = __name__.rpartition(".")[0]
-# Files and folders of trained networks, which are policies by their files, not by names; flying
-# does without the libraries that these import.
-LEARNED = ("gnn", "stored")
+# The modules of trained networks are not imported: they need torch or safetensors, which flying
+# other policies does not. Their policies have no names here, but files.
+NOT_IMPORTED = ("gnn", "stored")
 
 
 def policy_classes() -> Iterator[type[Policy]]:
     """Yield the classes of policies in this package, but for trained networks and common bases."""
     folders = sys.modules[PACKAGE].__path__
     for found in pkgutil.walk_packages(folders, f"{PACKAGE}."):
-        if found.name.removeprefix(f"{PACKAGE}.").partition(".")[0] in LEARNED:
+        below_package = found.name.removeprefix(f"{PACKAGE}.").split(".")
+        if below_package[0] in NOT_IMPORTED:
             continue
         module = import_module(found.name)
         for each in list(vars(module).values()):  # a copy, as one of the modules is this one
-            if isinstance(each, type) and each.__module__ == module.__name__ and _is_policy(each):
+            is_from_here = isinstance(each, type) and each.__module__ == module.__name__
+            if is_from_here and _is_policy(each):
                 yield each
 
 
@@ -76,11 +75,33 @@ def by_name(classes: Iterable[type[Policy]]) -> dict[str, type[Policy]]:
     return named
 
 
+def _in_order(classes: Iterable[type[Policy]]) -> dict[str, Listed]:
+    """Return what each policy of the package says of itself, in the order of lists."""
+    every = [SHIPPED_GNN]
+    every.extend(kind.about for kind in classes if isinstance(kind.about, Listed))
+    every.sort(key=lambda about: about.rank)
+    return {about.name: about for about in every}
+
+
+def _variants() -> dict[str, str]:
+    """Return the names of policies without their payload, by the policies whose variants they are.
+
+    The option `--payload none` turns a policy into its variant.
+    """
+    found: dict[str, str] = {}
+    for name, about in LISTED.items():
+        if isinstance(about.origin, VariantOf) and about.payload is None:
+            found[about.origin.policy] = name
+    return found
+
+
 CLASSES = by_name(policy_classes())
-_listed = [kind.about for kind in CLASSES.values() if isinstance(kind.about, Listed)]
-# What each policy of the package says of itself, in the order of lists.
-LISTED = {each.name: each for each in sorted([*_listed, SHIPPED_GNN], key=lambda each: each.rank)}
+LISTED = _in_order(CLASSES.values())
 POLICIES = tuple(LISTED)
+VARIANTS = _variants()
+# What `--payload` takes. At rest the planner's own is links, which this name stands for as well.
+PAYLOADS = (*(LISTED[name].payload_name for name in VARIANTS), "none")
+FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
 HAVE_PROBABILITY = tuple(
     name for name in POLICIES if issubclass(CLASSES.get(name, Policy), RandomTransmission)
 )
@@ -186,8 +207,10 @@ def about_of(name: str) -> About | None:
     A user's own is not imported for it, since its name may stand in a file: it is known where this
     process has loaded it.
     """
-    if name in LISTED or not is_own_policy(name):
-        return LISTED.get(name)
+    if name in LISTED:
+        return LISTED[name]
+    if not is_own_policy(name):
+        return None
     module, _, attribute = name.partition(":")
     found = getattr(sys.modules.get(module), attribute, None)
     about = getattr(unwrapped(found), "about", None)
@@ -211,9 +234,11 @@ def stored_policies(names: Iterable[str]) -> list[Path]:
 
 def listed(names: Iterable[str]) -> list[str]:
     """Return policies' names, each once; `all` stands for `POLICIES`, after the others."""
-    names = list(names)
-    every = dict.fromkeys((*names, *(POLICIES if "all" in names else ())))
-    return [name for name in every if name != "all"]
+    every = list(names)
+    if "all" in every:
+        every.extend(POLICIES)
+    each_once = dict.fromkeys(every)
+    return [name for name in each_once if name != "all"]
 
 
 def flown_name(name: str, mission: Mission) -> str:
@@ -226,15 +251,19 @@ def flown_name(name: str, mission: Mission) -> str:
 
 
 def with_payload(names: Sequence[str], payload: str) -> list[str]:
-    """Return the names of policies with this payload; ValueError if none of them has a choice."""
-    if payload == "snapshots":
+    """Return the names of policies with this payload, one of `PAYLOADS`.
+
+    Raises ValueError if there is to be none, and none of the policies has a choice.
+    """
+    if payload != "none":
         return list(names)
-    if not {"planner", WITHOUT_PAYLOAD} & set(names):
+    has_choice = {*VARIANTS, *VARIANTS.values()}
+    if not has_choice.intersection(names):
         raise ValueError(
             f"--payload says what the planner's packets carry, but not those of "
             f"{', '.join(names)}; leave it out"
         )
-    return [WITHOUT_PAYLOAD if name == "planner" else name for name in names]
+    return [VARIANTS.get(name, name) for name in names]
 
 
 def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:

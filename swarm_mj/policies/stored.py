@@ -39,6 +39,8 @@ WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
 @dataclass(frozen=True, kw_only=True)
 class _Metadata:
+    """What the metadata's entry says, but for its format and version."""
+
     kind: Literal["gnn", "mlp"]
     config: dict[str, Any]
     card: str
@@ -47,9 +49,11 @@ class _Metadata:
     @property
     def feature_set(self) -> str:
         """The name of the feature set, or "" for a config that has none, and so is unsound."""
+        # The config is not checked yet. A GNN's names its features itself, perceptrons' their
+        # network does.
         network = self.config.get("network")
-        inner = network.get("features") if isinstance(network, dict) else None
-        features = self.config.get("features", inner)
+        of_network = network.get("features") if isinstance(network, dict) else None
+        features = self.config.get("features", of_network)
         return features if isinstance(features, str) else ""
 
 
@@ -146,9 +150,10 @@ def load_policy(
         feature_sets.load_features(own)
         feature_sets.check_unchanged(own, feature_names, f"policy {path}")
     num_trained_on = config.network.num_features
-    if (num := feature_sets.num_features(seen)) != num_trained_on:  # in files of 1.0.0
+    num_now = feature_sets.num_features(seen)
+    if num_now != num_trained_on:  # in files of 1.0.0, which name no features
         raise ValueError(
-            f"policy {path} was trained on {num_trained_on} features, and {seen} now has {num}"
+            f"policy {path} was trained on {num_trained_on} features, and {seen} now has {num_now}"
         )
     extractor = feature_sets.make_extractor(seen, mission)
     if isinstance(config, MlpConfig):
@@ -170,7 +175,10 @@ def load_policy(
 
 
 def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
-    """Return a GNN, with its weights, and its config; errors as of `read_weights`."""
+    """Return a GNN, with its weights, and its config.
+
+    Raises errors as `read_weights` does, and ValueError for a policy that is no GNN.
+    """
     weights, config = read_weights(path)
     if not isinstance(config, GnnConfig):
         raise ValueError(f"policy {path} is a plain network; name one that `swarm-mj train` made")

@@ -110,7 +110,9 @@ class SpatialTdma(Tdma):
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
         self._range_m = mission.range_m
         self._threshold = from_db(mission.sinr_threshold_db)
-        self._law: PowerLaw | None = None  # of mean powers [noise]
+        self._law: PowerLaw | None = None  # of mean powers [noise]; None: that of free space
+        # Of the area, in which robots contend with one. Where it is small, many robots far apart
+        # could send at once, and turns take too long.
         share = math.pi * (CONTENTION_RANGES * self._range_m) ** 2 / mission.side_m**2
         self._num_expected = mission.num_robots * share  # robots in reach, oneself too
         self._contends = share <= 1.0 / MIN_CROWDS
@@ -128,6 +130,7 @@ class SpatialTdma(Tdma):
         self._powers = None if self._law is None else no_powers(self._law, len(rngs))
         self._draws = Stream(rngs, uniform, (2, num_robots))  # common to all robots
         if self._contends:
+            # Both of k as i knows, [b, i, k]: as `winners` has them.
             self._news = np.zeros((len(rngs), num_robots, num_robots), dtype=np.float32)
             self._noted_at = np.zeros_like(self._news)
 
@@ -187,10 +190,20 @@ def winners(
 ) -> Bool[np.ndarray, "B N"]:
     """Return who wins by its own beliefs, and bring `news` from T as noted to the present T.
 
-    Entry [b, i, k] of news is the rise of k's T, summed, since its last packet, as i estimates it
-    [windows]: k learned what i did if i believes it in range of the sender that i decoded. The
-    highest ln(u) / w wins (Efraimidis, Spirakis 2006), the rarer the fewer of those expected in
+    The highest ln(u) / w wins (Efraimidis, Spirakis 2006), the rarer the fewer of those expected in
     reach are known.
+
+    Args:
+        timestamp: T as each robot knows it [windows].
+        believed_m: Where each robot believes all to be [m].
+        heard: Whom each decoded in the last slot; itself: nobody.
+        draw: u of each robot, then one that decides how rarely it wins; both common to all, from
+            0 to 1.
+        range_m: The distance at which a lone packet just decodes [m].
+        num_expected: How many robots are expected in reach of each, itself too.
+        noted_at: T when news was last brought up to date; it becomes the present T [windows].
+        news: [b, i, k]: the rise of k's T, summed, since its last packet, as i estimates it
+            [windows]: k learned what i did if i believes it in range of the sender that i decoded.
     """
     wins = np.zeros(heard.shape, dtype=np.bool_)
     priority = np.empty(heard.shape[1])
@@ -204,10 +217,12 @@ def winners(
             for k in range(heard.shape[1]):
                 silence = timestamp[b, i, i] - timestamp[b, i, k]
                 has_sent = k != i and rise[k] > 0.0
+                # What k knows of itself grows newer all the time.
                 news[b, i, k] = silence if has_sent else news[b, i, k] + rise[i]
                 from_sender_m2 = squared_distance(believed_m[b, i], sender, k)
                 if k != sender and (k == i or from_sender_m2 <= range_m**2):
                     news[b, i, k] += learned
+                # The weight w is the cube of the news, so that who has much of it mostly wins.
                 priority[k] = math.log(draw[b, 0, k]) / (news[b, i, k] + SLOT_WINDOWS) ** 3
                 # Who was silent for a round of turns has failed, or is elsewhere.
                 is_heard = timestamp[b, i, k] > NEVER and silence < len(priority) * SLOT_WINDOWS

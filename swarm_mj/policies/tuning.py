@@ -39,13 +39,20 @@ class Tuned:
 def tuned_probability(policy_name: str, mission: Mission) -> float:
     """Return a policy's tuned probability in the regime that is nearest to a mission's.
 
-    Nearest by the ratios of team size, range and velocity, among the regimes of the same preset and
-    task; ValueError if there are none.
+    Args:
+        policy_name: A name among `registry.HAVE_PROBABILITY`.
+        mission: What is flown.
+
+    Returns:
+        The probability, from 0 to 1, of the regime nearest by the ratios of team size, range and
+        velocity, among those of the same preset and task.
+
+    Raises:
+        ValueError: If there is no such regime.
     """
     # Worlds have the paper's numbers but for arena and channel.
     preset = "paper" if mission.preset in WORLDS else mission.preset
-    group = (policy_name, preset, mission.task)
-    rows = [row for row in _table() if (row.policy, row.preset, row.task) == group]
+    rows = _rows_of(policy_name, preset, mission.task)
     if not rows:
         raise ValueError(
             f"{policy_name} has no tuned probability for {mission.preset} {mission.task} missions; "
@@ -53,7 +60,9 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
             "none, or tune it: tools/tune.py makes the rows of policies/tuned.csv"
         )
 
-    def distance(row: Tuned) -> float:  # between regimes: in logarithms, squared
+    def distance(row: Tuned) -> float:
+        """Return how far a regime is from the mission's: in logarithms, squared."""
+        # In logarithms, since twice the robots are as far away as half of them.
         ratios = [row.num_robots / mission.num_robots, row.range_ratio / mission.range_ratio]
         if mission.moves:
             ratios.append(row.velocity_ratio / mission.velocity_ratio)
@@ -62,8 +71,14 @@ def tuned_probability(policy_name: str, mission: Mission) -> float:
     return min(rows, key=distance).probability
 
 
+def _rows_of(policy: str, preset: str, task: str) -> list[Tuned]:
+    """Return the regimes in which a policy was tuned."""
+    wanted = (policy, preset, task)
+    return [row for row in _table() if (row.policy, row.preset, row.task) == wanted]
+
+
 def read_table(path: Path) -> list[Tuned]:
-    """Return the rows of a table; ValueError if it is no such table."""
+    """Return the rows of a table, as `tools/tune.py` writes it; ValueError if it is none."""
     rows = read_rows(path, "table", MAX_BYTES)
     return msgspec.convert([row for _, row in rows], list[Tuned], strict=False)
 

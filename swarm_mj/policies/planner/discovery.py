@@ -4,14 +4,22 @@ Both need only what is common before the mission: identities, the team's size an
 the clock. What a robot hears meanwhile can only keep it silent.
 """
 
-from typing import Literal
+from enum import Enum, auto
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import TeamView
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
+
+
+class Purpose(Enum):
+    """What a slot is for."""
+
+    DISCOVERY = auto()  # robots that may not know each other yet take turns
+    SEARCH = auto()  # for robots that were not heard from for long
+    PLAN = auto()
 
 
 class Discovery:
@@ -29,13 +37,13 @@ class Discovery:
         """Draw the orders of a mission whose area is as large as this many circles of the range."""
         self._range_m = range_m
         self._settings = settings
-        self._order = rng.permutation(num_robots)
-        self._place = np.argsort(self._order)
-        at_once = round(settings.transmitters_per_reach * num_reaches)
-        at_once = min(max(1, at_once), settings.max_transmitters)
+        self._order = rng.permutation(num_robots)  # of the search
+        self._place = np.argsort(self._order)  # of each robot in it
+        fitting = round(settings.transmitters_per_reach * num_reaches)
+        at_once = min(max(1, fitting), settings.max_transmitters)
         # The first round is fast although packets collide in it: few robots know any other yet.
         later = max(1, int(at_once * settings.later_share))
-        self._groups = []  # of robots that transmit at the same time
+        self._groups: list[Int[np.ndarray, " G"]] = []  # of robots that transmit at the same time
         for n in range(settings.num_orders):
             order = rng.permutation(num_robots)
             size = at_once if n < settings.num_fast_rounds else later
@@ -47,12 +55,12 @@ class Discovery:
 
     def purpose(
         self, slot: int, is_known: Bool[np.ndarray, "N"], is_fresh: Bool[np.ndarray, "N"]
-    ) -> Literal["discovery", "search", "plan"]:
+    ) -> Purpose:
         """Return what a slot is for, by a snapshot: which robots it knows, and which are fresh."""
         if slot < self._search_slot:
-            return "plan" if np.all(is_known) else "discovery"
+            return Purpose.PLAN if np.all(is_known) else Purpose.DISCOVERY
         is_turn = (slot // SLOTS_PER_WINDOW) % self._settings.search_every_windows == 0
-        return "search" if is_turn and not np.all(is_fresh) else "plan"
+        return Purpose.SEARCH if is_turn and not np.all(is_fresh) else Purpose.PLAN
 
     def transmits(self, slot: int, view: TeamView) -> Bool[np.ndarray, "N"]:
         """Return whose turn it is, except robots that know one nearby that comes before them."""
@@ -87,6 +95,7 @@ class Discovery:
             return transmits
         missing = self._order[~is_fresh[self._order]]
         transmits[missing[turn % len(missing)]] = True
+        # Row i of `was_fresh` at whom i heard: False if that robot was missing to i.
         has_found = (view.heard != everyone) & ~was_fresh[everyone, view.heard]
         for i in np.flatnonzero(has_found).tolist():
             there_m = view.position_m[i, view.heard[i]]

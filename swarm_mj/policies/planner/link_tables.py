@@ -2,13 +2,17 @@
 
 A robot that knows the schedule knows who transmitted in the slot before, and so which packet it
 should have decoded. It notes the kind of that packet: its sender, its margin in bins, and whether
-it was decoded. Index order: `[j, i]`: robot j listens to robot i.
+it was decoded. The margin is that of the SINR over the threshold, as was believed before anything
+was learned. Index order: `[j, i]`: robot j listens to robot i.
 
 A link's excess is how much stronger it is than was believed, in dB, the same in both directions.
 Every pair of a law of fades and a prior of the excess is a hypothesis. The most probable one is
 taken, unless the channel that was believed explains the observations about as well; then each
 link's excess follows by Bayes' rule. Packets carry what robots observed, and two tables: the one
 that the sender plans by, and the best of the next.
+
+Axes: K bins of the margin, F laws of fades and losses, X values of the excess, P priors of the
+excess, and L links, one for each pair of robots.
 """
 
 import math
@@ -34,7 +38,8 @@ NUM_BINS = 24
 BIN_CENTRES_DB = LEAST_MARGIN_DB + BIN_DB * np.arange(NUM_BINS)
 
 NOTHING = -1  # in place of the kind of a packet
-MISSED, DECODED = range(2)  # outcomes of a packet
+MISSED = 0  # outcomes of a packet
+DECODED = 1
 NUM_OUTCOMES = 2
 MAX_KINDS = 64  # that one robot notes
 MAX_TIMES = 255  # that it notes one kind
@@ -49,14 +54,19 @@ class Law(NamedTuple):
 
 EXCESS_DB = np.arange(-30.0, 18.1, 3.0)  # the values that are distinguished
 ERASURES = (0.0, 0.15, 0.3, 0.45)
-LAWS = tuple(Law(rician_k, loss) for rician_k in (NO_FADING, NO_LINE_OF_SIGHT) for loss in ERASURES)
+# The first one is what robots believe: nothing fades or is lost.
+LAWS = (
+    *(Law(NO_FADING, loss) for loss in ERASURES),
+    *(Law(NO_LINE_OF_SIGHT, loss) for loss in ERASURES),
+)
 SPREADS_DB = (3.0, 6.0, 9.0)  # of normal priors of a link's excess
 BLOCKED_SHARES = (0.3, 0.6)  # of priors in which links are as believed, or blocked
 BLOCKED_BELOW_DB = -20.0
 DOUBTFUL_STDS = 3.0  # of the margin by errors of positions, within which outcomes say nothing
 STEP_DB = 0.25  # to which tables are rounded
-SURPRISE = 0.005  # probability that a packet decodes, or not, against all laws: no single
-# packet may rule out a hypothesis, since no law here is exactly true
+# The probability that a packet decodes, or not, against all laws: no single packet may rule out a
+# hypothesis, since no law here is exactly true.
+SURPRISE = 0.005
 
 Counts = Int[np.ndarray, "N N K"]  # packets of i that j decoded, or missed, by bins of margin
 
@@ -77,21 +87,25 @@ def observe(
     num_robots = len(heard)
     everyone = np.arange(num_robots)
     is_other = ~np.eye(num_robots, dtype=bool)
-    arriving_mw = np.where(transmitted[:, None] & is_other, believed_mw, 0.0)
+    arriving_mw = np.where(transmitted[:, None] & is_other, believed_mw, 0.0)  # of i at j
     is_decoded = heard != everyone
     # Whose packet it was: of one that was missed, the strongest that should have arrived.
-    i = np.where(is_decoded, heard, np.argmax(arriving_mw, axis=0))
+    sender = np.where(is_decoded, heard, np.argmax(arriving_mw, axis=0))
     # A sum of its own: the packet that j decoded need not be the strongest by this belief.
-    others_mw = np.sum(np.where(everyone[:, None] == i, 0.0, arriving_mw), axis=0)
-    margin = prior.received_mw[i, everyone] / (prior.noise_mw + others_mw) / prior.threshold
+    is_sender = everyone[:, None] == sender
+    others_mw = np.sum(np.where(is_sender, 0.0, arriving_mw), axis=0)
+    sinr = prior.received_mw[sender, everyone] / (prior.noise_mw + others_mw)
+    margin = sinr / prior.threshold
     margin_db = to_db(np.maximum(margin, np.finfo(np.float64).tiny))
-    place = np.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5).astype(np.int64)
-    is_missed = np.any(arriving_mw > 0.0, axis=0) & (place >= 0)
+    nearest = np.floor((margin_db - LEAST_MARGIN_DB) / BIN_DB + 0.5).astype(np.int64)
+    # A packet too weak for the lowest bin tells something if it is decoded, nothing if it is not.
+    is_missed = np.any(arriving_mw > 0.0, axis=0) & (nearest >= 0)
     outcome = np.where(is_decoded, DECODED, MISSED)
-    bins = np.clip(place, 0, NUM_BINS - 1)
-    kind = np.ravel_multi_index((outcome, i, bins), _kinds(num_robots))
+    bins = np.clip(nearest, 0, NUM_BINS - 1)
+    kind = np.ravel_multi_index((outcome, sender, bins), _kinds(num_robots))
     # Where the error of positions may well have decided, a packet teaches nothing of the channel.
-    doubt_db = DOUBTFUL_STDS * 2.0 * DB_PER_NEPER / prior.distance_over_std[i, everyone]
+    # Power falls with the distance squared.
+    doubt_db = DOUBTFUL_STDS * 2.0 * DB_PER_NEPER / prior.distance_over_std[sender, everyone]
     is_telling = (is_decoded | is_missed) & (np.abs(margin_db) >= doubt_db)
     return np.where(listens & is_telling, kind, NOTHING)
 
@@ -109,13 +123,14 @@ class Evidence:
 
     def __init__(self, num_robots: int) -> None:
         self._slots: list[Int[np.ndarray, " N"]] = []  # the kind that j noted in each
-        # How often j noted each kind.
+        # [j, kind]: how often j noted each.
         self._times = np.zeros((num_robots, math.prod(_kinds(num_robots))), dtype=np.int64)
 
     def add(self, kinds: Int[np.ndarray, "N"]) -> None:
         """Note the next slot; robots whose notes are full count on only the kinds they have."""
         j = np.flatnonzero(kinds != NOTHING)
         times = self._times[j, kinds[j]]
+        # Packets have room for so many kinds; a new one is left out when a robot has them all.
         has_room = np.count_nonzero(self._times[j], axis=1) < MAX_KINDS
         is_noted = np.where(times == 0, has_room, times < MAX_TIMES)
         self._times[j, kinds[j]] += is_noted
@@ -125,9 +140,11 @@ class Evidence:
     def counts(self, known_until: Int[np.ndarray, "N"]) -> tuple[Counts, Counts]:
         """Return how many packets were decoded, and missed, until each robot's last slot."""
         num_robots = len(known_until)
-        kinds = np.array(self._slots, dtype=np.int64).reshape(-1, num_robots)
-        slot, j = np.nonzero((kinds != NOTHING) & (np.arange(len(kinds))[:, None] <= known_until))
+        kinds = np.array(self._slots, dtype=np.int64).reshape(-1, num_robots)  # [slot, j]
+        is_past = np.arange(len(kinds))[:, None] <= known_until
+        slot, j = np.nonzero((kinds != NOTHING) & is_past)
         times = np.zeros_like(self._times)
+        # Unlike `+=`, this counts each time that a robot noted the same kind.
         np.add.at(times, (j, kinds[slot, j]), 1)
         by_outcome = times.reshape(num_robots, *_kinds(num_robots))
         return by_outcome[:, DECODED], by_outcome[:, MISSED]
@@ -159,7 +176,9 @@ def tables_of(
     evidence: Evidence, known_until: Int[np.ndarray, "N N"], settings: PlannerSettings
 ) -> Tables:
     """Return what follows if [j, i] is the last slot of which j knows what i observed."""
-    rank = np.argsort(np.argsort(-np.sum(known_until, axis=1), kind="stable"))
+    # The sum of a row is larger the younger what j knows. Of equals, the lowest identity is best.
+    youngest_first = np.argsort(-np.sum(known_until, axis=1), kind="stable")
+    rank = np.argsort(youngest_first)
 
     def table(owner: int) -> LinkTable:
         decoded, missed = evidence.counts(known_until[owner])
@@ -174,22 +193,27 @@ def fit(decoded: Counts, missed: Counts, settings: PlannerSettings) -> LinkTable
     Rounding here rather than on the air keeps the plan of a table's owner that of everyone.
     """
     num_robots = len(decoded)
-    log_decoded, log_missed = _log_probabilities()
-    prior = _priors()
-    one, other = np.triu_indices(num_robots, 1)
+    one, other = np.triu_indices(num_robots, 1)  # the two robots of each link
     # A link is the same in both directions, and so is what was observed of it.
     link_decoded = (decoded + decoded.transpose(1, 0, 2))[one, other]
     link_missed = (missed + missed.transpose(1, 0, 2))[one, other]
-    log_likelihood = np.einsum("lk,kfx->lfx", link_decoded, log_decoded)
-    log_likelihood += np.einsum("lk,kfx->lfx", link_missed, log_missed)
+    prior = _priors()
+    # How probable what was observed of a link is, if a law holds and the link has some excess. As
+    # logarithms, relative to the most probable excess: products of many packets would be 0.
+    log_decoded, log_missed = _log_probabilities()
+    log_likelihood = np.einsum("LK,KFX->LFX", link_decoded, log_decoded)
+    log_likelihood += np.einsum("LK,KFX->LFX", link_missed, log_missed)
     most = log_likelihood.max(axis=2, keepdims=True)
     likelihood = np.exp(log_likelihood - most)
-    evidence = np.einsum("lfx,px->lfp", likelihood, prior) + np.finfo(np.float64).tiny
-    law, of_prior = _best(np.sum(np.log(evidence) + most, axis=0), settings.min_log_odds)
-    weight = likelihood[:, law] * prior[of_prior]
-    weight /= weight.sum(axis=1, keepdims=True)
-    mean_db = weight @ EXCESS_DB
-    std_db = np.sqrt(np.maximum(weight @ EXCESS_DB**2 - mean_db**2, 0.0))
+    # The same if a prior of the excess holds as well, and from it the best of such hypotheses.
+    of_link = np.einsum("LFX,PX->LFP", likelihood, prior) + np.finfo(np.float64).tiny
+    log_evidence = np.sum(np.log(of_link) + most, axis=0)
+    law, of_prior = _best(log_evidence, settings.min_log_odds)
+    # Bayes' rule: the probability of each excess is its prior times its likelihood, to a factor.
+    posterior = likelihood[:, law] * prior[of_prior]
+    posterior /= posterior.sum(axis=1, keepdims=True)
+    mean_db = posterior @ EXCESS_DB
+    std_db = np.sqrt(np.maximum(posterior @ EXCESS_DB**2 - mean_db**2, 0.0))
 
     def rounded(of_links: Float[np.ndarray, "L"]) -> Float[np.ndarray, "N N"]:
         """Return a number of each link by its two robots, in either order [dB]."""
@@ -216,15 +240,18 @@ def corrected(links: Links, table: LinkTable, settings: PlannerSettings) -> Link
     return doubtful(links, _curves(table.law), np.minimum(table.std_db, settings.max_std_db))
 
 
-def _best(explained: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int, int]:
-    """Return the most probable law and prior, at a price for each step from the believed ones."""
+def _best(log_evidence: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int, int]:
+    """Return the most probable law and prior, at a price for each step from the believed ones.
+
+    A law that loses packets is a step away, one that fades a step more, and so is another prior.
+    """
     steps = np.zeros(len(LAWS))
     for f, law in enumerate(LAWS):
-        if f > 0:  # the first law is the believed one
+        if f > 0:  # the first law is the believed one, in which nothing is lost or fades
             steps[f] += 1.0
         if law.rician_k != NO_FADING:
             steps[f] += 1.0
-    log_odds = explained - min_log_odds * steps[:, None]
+    log_odds = log_evidence - min_log_odds * steps[:, None]
     log_odds[:, 1:] -= min_log_odds  # the first prior is the believed one
     best_law, best_prior = np.unravel_index(np.argmax(log_odds), log_odds.shape)
     return int(best_law), int(best_prior)
@@ -232,6 +259,7 @@ def _best(explained: Float[np.ndarray, "F P"], min_log_odds: float) -> tuple[int
 
 @cache
 def _curves(law: int) -> Curves:
+    """Return how probably packets decode by a law, at any margin, as `decode_curves`."""
     return decode_curves(LAWS[law].rician_k, 1.0 - LAWS[law].loss)
 
 

@@ -27,10 +27,18 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.about import About, Information, Listed, Look, Payload, VariantOf
+from swarm_mj.policies.about import (
+    About,
+    Information,
+    Listed,
+    Look,
+    PairMemory,
+    Payload,
+    VariantOf,
+)
 from swarm_mj.policies.planner import link_tables
+from swarm_mj.policies.planner.epochs import SnapshotTeam
 from swarm_mj.policies.planner.plan import Plan
-from swarm_mj.policies.planner.policy import PLANNER_LOOK, PLANS_MEMORY, Planner
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
@@ -43,7 +51,10 @@ from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.system.decibels import from_db
 
 WITHOUT_PAYLOAD = "planner --payload none"  # the option makes it a policy of its own
-NOT_YET = np.iinfo(np.int64).max
+NOT_YET = np.iinfo(np.int64).max  # the slot since when a robot follows plans, if it does not
+PLANNER_LOOK = Look(label="planner", colour="#80391e", marker="d")  # moving or at rest
+# A plan by each of the snapshots that are still flown by, of which moving teams have many.
+PLANS_MEMORY = PairMemory(bytes_per_pair=250.0, from_round=1.0, moving_bytes_per_robot=4.0)
 # Of what either kind of packets leads to.
 BEYOND = (
     Information.COMMON_ORDER,
@@ -80,7 +91,7 @@ WITH_LINKS = About(
 class RestingPlanner(BroadcastPolicy):
     """Robots make one plan when they know where all rest.
 
-    Until then they take turns.
+    Until then they take turns, as in spatial TDMA. With a payload they learn their links, too.
     """
 
     about = Listed(
@@ -110,11 +121,13 @@ class RestingPlanner(BroadcastPolicy):
         If it learns, robots that hear of motion follow the planner of moving teams, unless only
         links fit into packets, as in some large teams.
         """
+        self._mission = mission
         self._belief = Belief(radio=radio_of(mission))
-        self._settings, self._learns = settings or PlannerSettings(), learns
+        self._settings = settings or PlannerSettings()
+        self._learns = learns
         self._turns = SpatialTdma(mission)
-        is_ready = learns and fits(packet_of(mission, snapshot_fields(mission)), mission)
-        self._moving = Planner(mission) if is_ready else None
+        has_room = fits(packet_of(mission, snapshot_fields(mission)), mission)
+        self._heeds_motion = learns and has_room
         if learns:
             self.about = WITH_LINKS
             self.payload = WITH_LINKS.payload_name
@@ -127,15 +140,16 @@ class RestingPlanner(BroadcastPolicy):
         """Plan by this belief from now on, also in the turns."""
         super().inform(belief)
         self._turns.inform(belief)
-        if self._moving is not None:
-            self._moving.inform(belief)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw each mission's order of turns and forget; arguments as in `Policy.start`."""
         # The turns draw first: without a payload, missions begin as those of spatial TDMA do.
         self._turns.start(num_robots, rngs)
-        if self._moving is not None:
-            self._moving.start(num_robots, rngs)
+        self._moving_teams: list[SnapshotTeam] = []
+        if self._heeds_motion:
+            for rng in rngs:
+                team = SnapshotTeam(num_robots, self._mission, self._belief, self._settings, rng)
+                self._moving_teams.append(team)
         self._has_moved = np.zeros(len(rngs), dtype=bool)
         self._teams = [
             _Team(num_robots, self._belief, self._settings, learns=self._learns) for _ in rngs
@@ -143,16 +157,25 @@ class RestingPlanner(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by the schedule it knows or in its turn."""
-        transmits, each = self._turns.transmits(views), team_views(views)
+        transmits = self._turns.transmits(views)
+        each = team_views(views)
         for b, team in enumerate(self._teams):
             transmits[b] = team.transmits(each[b], transmits[b])
-        if self._moving is not None:
+        if self._heeds_motion:
             knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
+            # Once a team has moved its epochs go on, also while all of its robots rest again.
             self._has_moved |= np.any(knows_motion, axis=1)
             for b in np.flatnonzero(self._has_moved).tolist():
-                by_snapshot = self._moving.teams[b].transmits(each[b])
+                by_snapshot = self._moving_teams[b].transmits(each[b])
                 transmits[b, knows_motion[b]] = by_snapshot[knows_motion[b]]
         return transmits
+
+
+class _Basis(NamedTuple):
+    """What a plan follows from: robots for which both are equal follow the same one."""
+
+    positions: bytes  # all of them, as the robot holds them
+    owner: int | None  # of the table of links; None: links are as believed
 
 
 class _Flight(NamedTuple):
@@ -164,20 +187,29 @@ class _Flight(NamedTuple):
     expected_mw: Float[np.ndarray, "N N"]  # power of i at j, by what was learned [mW]
 
 
+class _Followed(NamedTuple):
+    """A flight in one slot: who followed it, and who should have transmitted by its plan."""
+
+    follows: Bool[np.ndarray, "N"]
+    flight: _Flight
+    planned: Bool[np.ndarray, "N"]
+
+
 class _Team:
     """The robots of one mission, side by side; row i of every array is robot i's memory."""
 
     def __init__(
         self, num_robots: int, belief: Belief, settings: PlannerSettings, *, learns: bool
     ) -> None:
-        self._belief, self._settings, self._learns = belief, settings, learns
+        self._belief = belief
+        self._settings = settings
+        self._learns = learns
         self._everyone = np.arange(num_robots)
         self._round = SLOTS_PER_WINDOW * max(num_robots, settings.min_round_windows)  # [slots]
         self._first_slot: int | None = None  # in which the first decision was asked for
-        self._flights: dict[tuple[bytes, int | None], _Flight] = {}  # by positions and table
-        # In the slot before: groups of robots, their flight, and who transmitted by its plan.
-        self._followed: list[tuple[np.ndarray, _Flight, np.ndarray]] = []
-        self._transmitted = np.zeros(num_robots, dtype=bool)
+        self._flights: dict[_Basis, _Flight] = {}
+        self._followed: list[_Followed] = []  # in the slot before
+        self._transmitted = np.zeros(num_robots, dtype=bool)  # likewise
         self._joined = np.full(num_robots, NOT_YET)  # the slot since when i follows plans
         self._evidence = link_tables.Evidence(num_robots)
         self._current: link_tables.Tables | None = None
@@ -190,52 +222,71 @@ class _Team:
         Every slot is asked for once, in order.
         """
         now = round(view.now / SLOT_WINDOWS)
-        self._first_slot = now if self._first_slot is None else self._first_slot
+        if self._first_slot is None:
+            self._first_slot = now
         slot = now - self._first_slot
-        can_plan = np.all(view.is_known, axis=1) & ~np.any(view.velocity_mps, axis=(1, 2))
+        knows_all = np.all(view.is_known, axis=1)
+        knows_motion = np.any(view.velocity_mps, axis=(1, 2))
+        can_plan = knows_all & ~knows_motion
         if self._learns and slot > 0:
-            # [j, i]: the last slot of which j knows what i observed. A packet's news of its sender
-            # is from before the slot in which it was sent.
-            observed = np.rint(view.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
-            self._learn(slot, view.heard, observed - 2 - self._first_slot)
+            self._learn(slot, view.heard, _known_until(view, self._first_slot))
             self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
-        members: dict[tuple[bytes, int | None], list[int]] = {}
-        for i in np.flatnonzero(can_plan).tolist():
-            key = view.position_m[i].tobytes(), self._owner(i)
-            members.setdefault(key, []).append(i)
         self._followed = []
         transmits = in_turn.copy()
-        for key, robots in members.items():
-            if key not in self._flights:
-                self._flights[key] = self._flight(view.position_m[robots[0]], key[1])
-            flight = self._flights[key]
+        for basis, robots in self._groups(view, can_plan).items():
+            if basis not in self._flights:
+                self._flights[basis] = self._flight(view.position_m[robots[0]], basis.owner)
+            flight = self._flights[basis]
             planned = flight.plan.transmits(slot - flight.begin)
             transmits[robots] = planned[robots]
-            self._followed.append((np.isin(self._everyone, robots), flight, planned))
+            follows = np.isin(self._everyone, robots)
+            self._followed.append(_Followed(follows, flight, planned))
         self._transmitted = transmits
         return transmits
+
+    def _groups(self, view: TeamView, can_plan: Bool[np.ndarray, "N"]) -> dict[_Basis, list[int]]:
+        """Return the robots that can plan, by what their plans follow from."""
+        groups: dict[_Basis, list[int]] = {}
+        for i in np.flatnonzero(can_plan).tolist():
+            basis = _Basis(view.position_m[i].tobytes(), self._owner(i))
+            groups.setdefault(basis, []).append(i)
+        return groups
 
     def _learn(
         self, slot: int, heard: Int[np.ndarray, "N"], known_until: Int[np.ndarray, "N N"]
     ) -> None:
         """Note what the slot before taught, adopt better tables, and fit or use them in time."""
-        # A robot that has been silent for a round may be gone, and is not waited for.
-        is_silent = known_until < slot - self._round
-        knows_all = np.all(is_silent | (self._joined[None, :] <= known_until), axis=1)
-        kinds = np.full(len(self._everyone), link_tables.NOTHING)
-        for follows, flight, planned in self._followed:
-            listens = follows & ~self._transmitted & knows_all
-            noted = link_tables.observe(listens, heard, planned, flight.expected_mw, flight.prior)
-            kinds = np.maximum(kinds, noted)
-        self._evidence.add(kinds)
+        self._note(slot, heard, known_until)
         for tables in (self._current, self._next):
             if tables is not None:
                 tables.adopt(heard)
+        # Fitted early enough to reach everyone before they are flown by.
         if self._are_flown(slot + round(self._settings.spread_rounds * self._round)):
             self._next = link_tables.tables_of(self._evidence, known_until, self._settings)
         if self._are_flown(slot) and self._next is not None:
-            self._current, self._current_begin = self._next, slot
-            self._flights = {key: of for key, of in self._flights.items() if key[1] is None}
+            self._current = self._next
+            self._current_begin = slot
+            # Owners have other tables now. The plan by none goes on as it began.
+            for basis in list(self._flights):
+                if basis.owner is not None:
+                    del self._flights[basis]
+
+    def _note(
+        self, slot: int, heard: Int[np.ndarray, "N"], known_until: Int[np.ndarray, "N N"]
+    ) -> None:
+        """Note what packets were decoded or missed in the slot before, by who can tell."""
+        # A robot that has been silent for a round may be gone, and is not waited for.
+        is_silent = known_until < slot - self._round
+        # Whether all others follow plans, as far as j knows: else j cannot say who transmitted.
+        is_joined = self._joined[None, :] <= known_until
+        knows_all_plan = np.all(is_silent | is_joined, axis=1)
+        kinds = np.full(len(self._everyone), link_tables.NOTHING)
+        for follows, flight, planned in self._followed:
+            listens = follows & ~self._transmitted & knows_all_plan
+            noted = link_tables.observe(listens, heard, planned, flight.expected_mw, flight.prior)
+            # Each robot follows one flight, and nothing is noted of it in the others.
+            kinds = np.maximum(kinds, noted)
+        self._evidence.add(kinds)
 
     def _are_flown(self, slot: int) -> bool:
         """Return whether all robots begin to use the tables made last."""
@@ -251,15 +302,26 @@ class _Team:
         return None if self._current.table(owner).changes_nothing else owner
 
     def _flight(self, position_m: Float[np.ndarray, "N 2"], owner: int | None) -> _Flight:
+        """Return the flight from these positions, by someone's table or as was believed."""
         prior = self._belief.links(position_m)
         if owner is None or self._current is None:
-            drawn = partial(self._drawn, position_m) if self._belief.position_noise_m else None
-            plan = Plan(prior, self._settings, links_from=drawn)
-            return _Flight(plan, 0, prior, prior.received_mw)
+            drawn = None
+            if self._belief.position_noise_m:
+                drawn = partial(self._drawn, position_m)
+            return _Flight(
+                plan=Plan(prior, self._settings, links_from=drawn),
+                begin=0,  # whenever a robot joins it
+                prior=prior,
+                expected_mw=prior.received_mw,
+            )
         table = self._current.table(owner)
-        plan = Plan(link_tables.corrected(prior, table, self._settings), self._settings)
-        expected_mw = prior.received_mw * from_db(table.mean_db)
-        return _Flight(plan, self._current_begin, prior, expected_mw)
+        links = link_tables.corrected(prior, table, self._settings)
+        return _Flight(
+            plan=Plan(links, self._settings),
+            begin=self._current_begin,
+            prior=prior,
+            expected_mw=prior.received_mw * from_db(table.mean_db),
+        )
 
     def _drawn(self, position_m: Float[np.ndarray, "N 2"], slot: int) -> Links:
         """Return links between places where robots may be, drawn by the slot: the same for all.
@@ -267,7 +329,20 @@ class _Team:
         A link that never works would else be planned with for ever, as packets over it have the
         same chance each time.
         """
-        noise_m, share = self._belief.position_noise_m, self._settings.drawn_share
+        noise_m = self._belief.position_noise_m
+        share = self._settings.drawn_share
         error_m = noise_m * np.random.default_rng(slot).standard_normal(position_m.shape)
+        # What is drawn of the variance, share ** 2, is no longer doubted.
         belief = replace(self._belief, position_noise_m=math.sqrt(1.0 - share**2) * noise_m)
         return belief.links(position_m + share * error_m)
+
+
+def _known_until(view: TeamView, first_slot: int) -> Int[np.ndarray, "N N"]:
+    """Return, as [j, i], the last slot of which j knows what i observed.
+
+    Slots count from the first one. T is when the slot ended in which i sent what j knows of it, and
+    in that packet i could only tell of the slots before.
+    """
+    ended = np.rint(view.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
+    sent_in = ended - 1 - first_slot
+    return sent_in - 1

@@ -57,6 +57,7 @@ def take_snapshots(
     velocity_mps = view.velocity_mps
     num_robots = len(is_known)
     num_known = np.sum(is_known, axis=1)
+    # How far beliefs err grows with their age, and with how differently robots move.
     age = np.where(is_known, view.now - view.timestamp, 0.0)
     ahead = age + windows_ahead
     mean_mps = np.sum(velocity_mps * is_known[..., None], axis=1) / num_known[:, None]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from standing_teams import view_of
 
-from swarm_mj.policies.planner.discovery import Discovery
+from swarm_mj.policies.planner.discovery import Discovery, Purpose
 from swarm_mj.policies.planner.settings import PlannerSettings
 
 RANGE_M = 100.0
@@ -118,17 +118,17 @@ def test_whose_turn_it_is_by_hand():
     everyone, some = fresh(), fresh(2)
     for slot in range(2 * LATE):
         is_early, is_fifth = slot < LATE, slot % 10 in (0, 1)
-        late = "search" if is_fifth else "plan"
-        assert turns.purpose(slot, some, some) == ("discovery" if is_early else late)
-        assert turns.purpose(slot, everyone, some) == ("plan" if is_early else late)
-        assert turns.purpose(slot, everyone, everyone) == "plan"
+        late = Purpose.SEARCH if is_fifth else Purpose.PLAN
+        assert turns.purpose(slot, some, some) == (Purpose.DISCOVERY if is_early else late)
+        assert turns.purpose(slot, everyone, some) == (Purpose.PLAN if is_early else late)
+        assert turns.purpose(slot, everyone, everyone) == Purpose.PLAN
 
 
 @pytest.mark.parametrize(("num_robots", "windows"), [(2, 10), (40, 200), (100, 200)])
 def test_large_teams_do_not_wait_for_5_rounds(num_robots, windows):
     turns, nobody = discovery_of(num_robots, 1.0), np.zeros(num_robots, dtype=bool)
-    assert turns.purpose(2 * windows - 1, nobody, nobody) == "discovery"
-    assert turns.purpose(2 * windows, nobody, nobody) == "search"
+    assert turns.purpose(2 * windows - 1, nobody, nobody) == Purpose.DISCOVERY
+    assert turns.purpose(2 * windows, nobody, nobody) == Purpose.SEARCH
 
 
 def sought(slot, lost, heard=None, places_m=None, knows=None, was_missing=None, seed=0):
