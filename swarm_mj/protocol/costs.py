@@ -242,7 +242,7 @@ def _measure(
 
 @compiled()
 def _count_addressed(request: Phase, response: Phase, counts: Shaped[np.ndarray, "B"]) -> None:
-    """Fill in the fates of requests and responses (Alg. 1)."""
+    """Fill in the fates of requests and of the responses to them, as in Alg. 1."""
     for b in range(counts.shape[0]):
         asked = _count_slot(request.recipient[b], request.heard[b])
         replied = _count_slot(response.recipient[b], response.heard[b])
