@@ -8,10 +8,10 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-A    Eq. 2   channel gain             radio.free_space.channel_gain
     II-A    Eq. 3   SINR                     radio.reception.sinr
     II-A    Eq. 4   reception                radio.reception.is_received
-    II-B    Eq. 5   self-observation         protocol.buffers.observe_self
+    II-B    Eq. 5   self-observation         protocol.buffers.write_own
     II-B    Eq. 6   channel f                radio.free_space.Channel
-    II-B    Eq. 7   last attempt             protocol.buffers.record_attempt
-    II-B    Eq. 8   merge                    protocol.buffers.merge
+    II-B    Eq. 7   last attempt             protocol.buffers.write_attempt
+    II-B    Eq. 8   merge                    protocol.buffers.merge_newer
     II-B    Fig. 1  a robot's buffer         protocol.buffers.Buffers
     II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
     II-C    Eq. 10  age of information       protocol.costs.age_of_information

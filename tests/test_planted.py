@@ -98,6 +98,13 @@ FOR_THE_TYPE_CHECKER = [
         said='Argument missing for parameter "loss_db"',
     ),
     Mistake(
+        name="a misspelt number of a flight's summary",
+        file="swarm_mj/api/run.py",
+        before="age = self.summary.aoi_mean",
+        after="age = self.summary.aoi_meen",
+        said='Cannot access attribute "aoi_meen" for class "FlightSummary"',
+    ),
+    Mistake(
         name="a policy that leaves out one of its facts",
         file="swarm_mj/policies/greedy_oracle.py",
         before='about = Listed(\n        name="greedy-oracle",',

@@ -14,8 +14,9 @@ from typing import Any, NamedTuple
 import numpy as np
 from rich.console import Console
 
+from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_numbers
-from swarm_mj.api.run import Metrics, Run
+from swarm_mj.api.run import Run
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies import registry
@@ -121,7 +122,7 @@ def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flow
     run = Run(
         mission=mission,
         config=flight.config(),
-        summary=Metrics(numbers),
+        summary=FlightSummary(**numbers),
         windows=tuple(windows),
     )
     if ending:

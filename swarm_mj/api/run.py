@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Float
 from rich.table import Table
 
+from swarm_mj.api.flight_summary import FlightSummary, as_lines
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.costs import PACKET_COUNTS
@@ -57,13 +58,7 @@ class Metrics(dict[str, Any]):
 
     def __repr__(self) -> str:
         """Return a line for each name; metrics within metrics are indented."""
-        width = max(map(len, self), default=0)
-        lines = []
-        for name, value in self.items():
-            shown = f"{value:.6g}" if isinstance(value, float) else str(value)
-            nested = f"{name}\n  " + shown.replace("\n", "\n  ")
-            lines.append(nested if isinstance(value, Metrics) else f"{name:{width}}  {shown}")
-        return "\n".join(lines)
+        return as_lines(self)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -92,7 +87,7 @@ class Run:
 
     mission: Mission
     config: Mapping[str, Any]
-    summary: Metrics
+    summary: FlightSummary
     windows: Sequence[WindowRecord]
     log: Log | None = None
 

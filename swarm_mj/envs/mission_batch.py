@@ -78,7 +78,6 @@ class MissionBatch:
             is_complete=is_complete,
             velocity_variance_m2ps2=velocity_variance(self.swarm.states.velocity_mps),
             counts=no_packets(self.num_missions),
-            is_broadcast=False,
             task_cost=self.swarm.task_cost(),
         )
         self.recipients: list[np.ndarray] = []  # of the windows flown, if they are kept

@@ -2,6 +2,10 @@
 
 Index order: `[b, i, j]` is what robot `i` of mission `b` knows about robot `j`. The functions here
 are the only ones that write a buffer, and they write it in place.
+
+Each equation is one loop over arrays, `write_own`, `write_attempt` and `merge_newer`, from which
+windows of both kinds are made, compiled ones too. `observe_self`, `record_attempt` and `merge` take
+the arrays out of `Buffers` for these loops.
 """
 
 from dataclasses import dataclass, fields
@@ -77,85 +81,29 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
     buffers.is_granted[:] = True
 
 
-def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
-    """Write every active robot's own state and the time t into its own buffer (Eq. 5)."""
-    write_own(
-        timestamp=buffers.timestamp,
-        believed_m=buffers.position_m,
-        believed_mps=buffers.velocity_mps,
-        position_m=states.own_m,
-        velocity_mps=states.velocity_mps,
-        now=now,
-        is_active=states.is_active,
-    )
-
-
-def record_attempt(
-    buffers: Buffers,
-    recipient: Int[np.ndarray, "B N"],
-    now: Float[np.ndarray, "B"],
-    is_active: Bool[np.ndarray, "B N"] | None = None,
-    *,
-    silence_is_attempt: bool = False,
-) -> None:
-    """Note when each active robot last addressed its recipient (Eq. 7).
-
-    Args:
-        buffers: The robots' buffers, of which L is written.
-        recipient: Whom each robot addresses, [B, N]; itself is silence. `BROADCAST` addresses no
-            robot.
-        now: t, [B], [windows].
-        is_active: Who notes anything, [B, N]; None is everyone.
-        silence_is_attempt: Whether a silent robot notes having addressed itself.
-    """
-    write_attempt(
-        last_attempt=buffers.last_attempt,
-        recipient=recipient,
-        now=now,
-        silence_is_attempt=silence_is_attempt,
-        is_active=is_active,
-    )
-
-
-def merge(
-    buffers: Buffers,
-    heard: Int[np.ndarray, "B N"],
-    sent: Float[np.ndarray, "B N N"] | None = None,
-) -> None:
-    """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
-
-    A packet holds its sender's buffer as it was before the phase. Information that comes straight
-    from its subject gets the receiver as parent (II-B: P^{i,k} = i). An entry keeps its parent if
-    the parent's own entry is in the packet, and otherwise names the sender: so buffers remain
-    trees, although some robots on the way are left out.
-
-    Args:
-        buffers: The robots' buffers, written in place.
-        heard: The sender that each robot decoded, [B, N]; itself is nobody.
-        sent: T of the entries in each robot's packet, [B, N, N], [windows], `ABSENT` for those that
-            it left out; None is the whole buffer.
-    """
-    merge_newer(
-        sent=buffers.timestamp if sent is None else sent,
-        heard=heard,
-        timestamp=buffers.timestamp,
-        position_m=buffers.position_m,
-        velocity_mps=buffers.velocity_mps,
-        parent=buffers.parent,
-    )
-
-
 @compiled()
 def write_own(
     timestamp: Float[np.ndarray, "B N N"],
     believed_m: Float[np.ndarray, "B N N 2"],
     believed_mps: Float[np.ndarray, "B N N 2"],
-    position_m: Float[np.ndarray, "B N 2"],
-    velocity_mps: Float[np.ndarray, "B N 2"],
+    observed_m: Float[np.ndarray, "B N 2"],
+    observed_mps: Float[np.ndarray, "B N 2"],
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
-    """Do what `observe_self` says."""
+    """Write every active robot's own state and the time t into its own buffer (Eq. 5).
+
+    T^{i,i} = t, and M^{i,i} is what robot i observes of itself at t.
+
+    Args:
+        timestamp: T of the robots' buffers, [B N N], [windows]; written, as the next two are.
+        believed_m: The positions of M, [B N N 2], [m].
+        believed_mps: The velocities of M, [B N N 2], [m/s].
+        observed_m: Where each robot observes itself to be, [B N 2], [m].
+        observed_mps: How fast it observes itself to be, [B N 2], [m/s].
+        now: t, [B], [windows].
+        is_active: Who observes anything, [B N]; None is everyone.
+    """
     num_missions, num_robots = timestamp.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
@@ -164,8 +112,21 @@ def write_own(
                 continue
             timestamp[b, i, i] = now[b]
             for axis in range(2):
-                believed_m[b, i, i, axis] = position_m[b, i, axis]
-                believed_mps[b, i, i, axis] = velocity_mps[b, i, axis]
+                believed_m[b, i, i, axis] = observed_m[b, i, axis]
+                believed_mps[b, i, i, axis] = observed_mps[b, i, axis]
+
+
+def observe_self(buffers: Buffers, states: RobotStates, now: Float[np.ndarray, "B"]) -> None:
+    """Let every active robot observe itself at t, as `write_own` says; `now` is t [windows]."""
+    write_own(
+        timestamp=buffers.timestamp,
+        believed_m=buffers.position_m,
+        believed_mps=buffers.velocity_mps,
+        observed_m=states.own_m,
+        observed_mps=states.velocity_mps,
+        now=now,
+        is_active=states.is_active,
+    )
 
 
 @compiled()
@@ -176,7 +137,18 @@ def write_attempt(
     silence_is_attempt: bool,
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
-    """Do what `record_attempt` says."""
+    """Note when each active robot last addressed its recipient (Eq. 7).
+
+    L^{i,j} = t for the recipient j of robot i, and stays as it was for all others.
+
+    Args:
+        last_attempt: L of the robots' buffers, [B N N], [windows]; written.
+        recipient: Whom each robot addresses, [B N]; itself is silence. `BROADCAST` addresses no
+            robot.
+        now: t, [B], [windows].
+        silence_is_attempt: Whether a silent robot notes having addressed itself.
+        is_active: Who notes anything, [B N]; None is everyone.
+    """
     num_missions, num_robots = recipient.shape
     for b in range(num_missions):
         for i in range(num_robots):
@@ -187,23 +159,57 @@ def write_attempt(
                 last_attempt[b, i, j] = now[b]
 
 
+def record_attempt(
+    buffers: Buffers,
+    recipient: Int[np.ndarray, "B N"],
+    now: Float[np.ndarray, "B"],
+    is_active: Bool[np.ndarray, "B N"] | None = None,
+    *,
+    silence_is_attempt: bool = False,
+) -> None:
+    """Note in the buffers whom each active robot addresses, as `write_attempt` says."""
+    write_attempt(
+        last_attempt=buffers.last_attempt,
+        recipient=recipient,
+        now=now,
+        silence_is_attempt=silence_is_attempt,
+        is_active=is_active,
+    )
+
+
 @compiled()
 def merge_newer(
     sent: Float[np.ndarray, "B N N"],
     heard: Int[np.ndarray, "B N"],
     timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    velocity_mps: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N 2"],
+    believed_mps: Float[np.ndarray, "B N N 2"],
     parent: Int[np.ndarray, "B N N"],
 ) -> None:
-    """Do what `merge` says."""
+    """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
+
+    Where robot i decoded j, and T^{i,k} < T^{j,k}, i's T, M and P of k become j's. A packet holds
+    its sender's buffer as it was before the phase. Information that comes straight from its subject
+    gets the receiver as parent (II-B: P^{i,k} = i). An entry keeps its parent if the parent's own
+    entry is in the packet, and otherwise names the sender: so buffers remain trees, although some
+    robots on the way are left out.
+
+    Args:
+        sent: T of the entries in each robot's packet, [B N N], [windows], `ABSENT` for those that
+            it left out; `timestamp` itself if packets hold whole buffers.
+        heard: The sender that each robot decoded, [B N]; itself is nobody.
+        timestamp: T of the robots' buffers, [B N N], [windows]; written, as all that follow.
+        believed_m: The positions of M, [B N N 2], [m].
+        believed_mps: The velocities of M, [B N N 2], [m/s].
+        parent: P, [B N N].
+    """
     num_missions, num_robots = heard.shape
     for b in range(num_missions):
         # Packets are read from the buffers before the phase: a copy where a sender also decodes,
         # which only the reference preset lets happen; else no row is both read and written.
         sent_t = sent[b]
-        sent_m = position_m[b]
-        sent_mps = velocity_mps[b]
+        sent_m = believed_m[b]
+        sent_mps = believed_mps[b]
         sent_parent = parent[b]
         if _senders_listen(heard[b]):
             sent_t = sent_t.copy()
@@ -218,9 +224,31 @@ def merge_newer(
                 if is_newer(sent_t[j, k], timestamp[b, i, k]):
                     timestamp[b, i, k] = sent_t[j, k]
                     for axis in range(2):
-                        position_m[b, i, k, axis] = sent_m[j, k, axis]
-                        velocity_mps[b, i, k, axis] = sent_mps[j, k, axis]
+                        believed_m[b, i, k, axis] = sent_m[j, k, axis]
+                        believed_mps[b, i, k, axis] = sent_mps[j, k, axis]
                     parent[b, i, k] = i if k == j else _kept_parent(sent_parent[j, k], sent_t, j)
+
+
+def merge(
+    buffers: Buffers,
+    heard: Int[np.ndarray, "B N"],
+    sent: Float[np.ndarray, "B N N"] | None = None,
+) -> None:
+    """Merge the packets that robots decoded into their buffers, as `merge_newer` says.
+
+    Args:
+        buffers: The robots' buffers, written in place.
+        heard: The sender that each robot decoded, [B N]; itself is nobody.
+        sent: T of the entries in each robot's packet, [B N N], [windows]; None is the whole buffer.
+    """
+    merge_newer(
+        sent=buffers.timestamp if sent is None else sent,
+        heard=heard,
+        timestamp=buffers.timestamp,
+        believed_m=buffers.position_m,
+        believed_mps=buffers.velocity_mps,
+        parent=buffers.parent,
+    )
 
 
 @compiled()

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, Shaped
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
@@ -32,7 +32,14 @@ class Packets(NamedTuple):
     receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
 
 
-PACKET_COUNTS = Packets._fields
+class SlotCounts(NamedTuple):
+    """What is counted of the packets of one slot in one mission, before they have fates."""
+
+    sent: int
+    delivered: int  # decoded by their recipient
+    overheard: int  # times that a robot decoded what was meant for another
+    heard: int  # packets that at least one robot decoded
+    receptions: int  # times that a robot decoded a packet
 
 
 def age_of_information(
@@ -100,26 +107,19 @@ class TaskCost:
     value: Float[np.ndarray, "B"]
 
 
-class CountRows(NamedTuple):
-    """The rows of `WindowCosts.counts`: what is counted of the packets of a window's two slots."""
+PACKET_COUNTS = Packets._fields  # the names of all counts
 
-    sent_first: int  # in the first slot
-    sent_second: int
-    delivered_first: int  # of the first slot's, decoded by their recipient
-    delivered_second: int
-    overheard: int  # in both slots: receptions of what was meant for another
-    heard: int  # in both slots: packets that at least one robot decoded
-    receptions: int  # in both slots: times that a robot decoded a packet
+# `Packets` as one array, whose elements have its fields: nine arrays would take as long to make and
+# to pass to compiled code as all costs of a single mission take to measure.
+COUNTS = np.dtype([(name, np.float64) for name in PACKET_COUNTS])
 
 
-# One array of named rows, not seven arrays: those take as long to make and to pass to compiled
-# code as all costs of a single mission take to measure.
-ROW = CountRows(*range(len(CountRows._fields)))
-
-
-def no_packets(num_missions: int) -> Float[np.ndarray, "K B"]:
-    """Return counts of 0."""
-    return np.zeros((len(ROW), num_missions))
+def no_packets(num_missions: int) -> Shaped[np.ndarray, "B"]:
+    """Return the counts of a window of Alg. 1 in which nobody transmits."""
+    counts = np.zeros(num_missions, COUNTS)
+    counts["heard"] = np.nan
+    counts["receptions"] = np.nan
+    return counts
 
 
 class WindowCosts(NamedTuple):
@@ -128,39 +128,13 @@ class WindowCosts(NamedTuple):
     age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
     is_complete: Bool[np.ndarray, "B"]  # whether all robots know all others
     velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
-    counts: Float[np.ndarray, "K B"]  # of packets, by the rows of `ROW` [packets]
-    is_broadcast: bool  # whether both slots hold broadcasts (IV-C), or the second answers (Alg. 1)
+    counts: Shaped[np.ndarray, "B"]  # the fates of the packets, as `COUNTS`
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
 
     @property
     def packets(self) -> Packets:
         """The fates of the packets."""
-        counts = self.counts
-        transmitted = counts[ROW.sent_first] + counts[ROW.sent_second]
-        none = np.full(len(transmitted), np.nan)
-        if self.is_broadcast:
-            return Packets(
-                sent=transmitted,
-                transmitted=transmitted,
-                attempted=none,
-                delivered=none,
-                lost=none,
-                overheard=none,
-                answered=none,
-                heard=counts[ROW.heard],
-                receptions=counts[ROW.receptions],
-            )
-        return Packets(
-            sent=counts[ROW.sent_first],
-            transmitted=transmitted,
-            attempted=counts[ROW.sent_first],
-            delivered=counts[ROW.delivered_first],
-            lost=counts[ROW.sent_first] - counts[ROW.delivered_first],
-            overheard=counts[ROW.overheard],
-            answered=counts[ROW.delivered_second],
-            heard=none,
-            receptions=none,
-        )
+        return Packets._make(self.counts[name] for name in PACKET_COUNTS)
 
 
 def window_costs(
@@ -187,7 +161,7 @@ def window_costs(
     age = np.empty(num_missions)
     is_complete = buffers.is_granted.copy()
     variance = np.empty(num_missions)
-    counts = no_packets(num_missions)
+    counts = np.empty(num_missions, COUNTS)
     # All in one call: of a single mission, calls take longer than what they do. The arrays are
     # flat, by name: to take named tuples of them apart would take longer, too.
     _measure(
@@ -195,10 +169,11 @@ def window_costs(
         now=now,
         velocity_mps=states.velocity_mps,
         is_active=states.is_active,
-        recipient_first=first.recipient,
-        heard_first=first.heard,
-        recipient_second=second.recipient,
-        heard_second=second.heard,
+        first_recipient=first.recipient,
+        first_heard=first.heard,
+        second_recipient=second.recipient,
+        second_heard=second.heard,
+        is_broadcast=is_broadcast,
         age=age,
         is_complete=is_complete,
         variance=variance,
@@ -209,7 +184,6 @@ def window_costs(
         is_complete=is_complete,
         velocity_variance_m2ps2=variance,
         counts=counts,
-        is_broadcast=is_broadcast,
         task_cost=task_cost,
     )
 
@@ -243,63 +217,90 @@ def _measure(
     now: Float[np.ndarray, "B"],
     velocity_mps: Float[np.ndarray, "B N 2"],
     is_active: Bool[np.ndarray, "B N"] | None,
-    recipient_first: Int[np.ndarray, "B N"],
-    heard_first: Int[np.ndarray, "B N"],
-    recipient_second: Int[np.ndarray, "B N"],
-    heard_second: Int[np.ndarray, "B N"],
+    first_recipient: Int[np.ndarray, "B N"],
+    first_heard: Int[np.ndarray, "B N"],
+    second_recipient: Int[np.ndarray, "B N"],
+    second_heard: Int[np.ndarray, "B N"],
+    is_broadcast: bool,
     age: Float[np.ndarray, "B"],
     is_complete: Bool[np.ndarray, "B"],
     variance: Float[np.ndarray, "B"],
-    counts: Float[np.ndarray, "K B"],
+    counts: Shaped[np.ndarray, "B"],
 ) -> None:
-    """Fill in all costs, from `age` on; counts are added to, so they begin at 0."""
+    """Fill in all costs, from `age` on."""
     _mean_age(timestamp, now, is_active, age, is_complete)
     by_mission = velocity_variance(velocity_mps, is_active)
     for b in range(variance.shape[0]):
         variance[b] = by_mission[b]
-    _count(
-        recipient=recipient_first,
-        heard=heard_first,
-        sent=counts[ROW.sent_first],
-        delivered=counts[ROW.delivered_first],
-        overheard=counts[ROW.overheard],
-        num_heard=counts[ROW.heard],
-        receptions=counts[ROW.receptions],
-    )
-    _count(
-        recipient=recipient_second,
-        heard=heard_second,
-        sent=counts[ROW.sent_second],
-        delivered=counts[ROW.delivered_second],
-        overheard=counts[ROW.overheard],
-        num_heard=counts[ROW.heard],
-        receptions=counts[ROW.receptions],
-    )
+    first = Phase(recipient=first_recipient, heard=first_heard)
+    second = Phase(recipient=second_recipient, heard=second_heard)
+    if is_broadcast:
+        _count_broadcasts(first, second, counts)
+    else:
+        _count_addressed(first, second, counts)
 
 
 @compiled()
-def _count(
-    recipient: Int[np.ndarray, "B N"],
-    heard: Int[np.ndarray, "B N"],
-    sent: Float[np.ndarray, "B"],
-    delivered: Float[np.ndarray, "B"],
-    overheard: Float[np.ndarray, "B"],
-    num_heard: Float[np.ndarray, "B"],
-    receptions: Float[np.ndarray, "B"],
-) -> None:
-    """Add one slot's packets to the counts."""
-    for b in range(recipient.shape[0]):
-        is_heard = np.zeros(recipient.shape[1], dtype=np.bool_)
-        for i in range(recipient.shape[1]):
-            sent[b] += recipient[b, i] != i
-            sender = heard[b, i]
-            if sender != i:
-                is_meant = recipient[b, sender] == i
-                delivered[b] += is_meant
-                overheard[b] += not is_meant
-                num_heard[b] += not is_heard[sender]
-                receptions[b] += 1
-                is_heard[sender] = True
+def _count_addressed(request: Phase, response: Phase, counts: Shaped[np.ndarray, "B"]) -> None:
+    """Fill in the fates of requests and of the responses to them, as in Alg. 1."""
+    for b in range(counts.shape[0]):
+        asked = _count_slot(request.recipient[b], request.heard[b])
+        replied = _count_slot(response.recipient[b], response.heard[b])
+        counts[b].sent = asked.sent
+        counts[b].transmitted = asked.sent + replied.sent
+        counts[b].attempted = asked.sent
+        counts[b].delivered = asked.delivered
+        counts[b].lost = asked.sent - asked.delivered
+        counts[b].overheard = asked.overheard + replied.overheard
+        counts[b].answered = replied.delivered
+        counts[b].heard = np.nan
+        counts[b].receptions = np.nan
+
+
+@compiled()
+def _count_broadcasts(first: Phase, second: Phase, counts: Shaped[np.ndarray, "B"]) -> None:
+    """Fill in the fates of the broadcasts of two slots (IV-C)."""
+    for b in range(counts.shape[0]):
+        one = _count_slot(first.recipient[b], first.heard[b])
+        other = _count_slot(second.recipient[b], second.heard[b])
+        counts[b].sent = one.sent + other.sent
+        counts[b].transmitted = one.sent + other.sent
+        counts[b].attempted = np.nan
+        counts[b].delivered = np.nan
+        counts[b].lost = np.nan
+        counts[b].overheard = np.nan
+        counts[b].answered = np.nan
+        counts[b].heard = one.heard + other.heard
+        counts[b].receptions = one.receptions + other.receptions
+
+
+@compiled()
+def _count_slot(recipient: Int[np.ndarray, "N"], heard: Int[np.ndarray, "N"]) -> SlotCounts:
+    """Count the packets of one slot in one mission."""
+    sent = 0
+    delivered = 0
+    overheard = 0
+    num_heard = 0
+    receptions = 0
+    is_heard = np.zeros(recipient.shape[0], dtype=np.bool_)
+    for i in range(recipient.shape[0]):
+        sent += recipient[i] != i
+        sender = heard[i]
+        if sender == i:
+            continue
+        is_meant = recipient[sender] == i
+        delivered += is_meant
+        overheard += not is_meant
+        num_heard += not is_heard[sender]
+        receptions += 1
+        is_heard[sender] = True
+    return SlotCounts(
+        sent=sent,
+        delivered=delivered,
+        overheard=overheard,
+        heard=num_heard,
+        receptions=receptions,
+    )
 
 
 @compiled()

@@ -211,18 +211,21 @@ def silence(robots: Int[np.ndarray, "B N"], is_active: Bool[np.ndarray, "B N"] |
 
 def channel_at(
     channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "B"],
+    t: Float[np.ndarray, "B"],
     mission: Int[np.ndarray, "B"] | None = None,
 ) -> Channel:
-    """Return the channel of the slot that ends at t, row by row [windows].
+    """Return the channel of one slot, row by row.
 
-    Rows are those of these missions; None is all missions in order.
+    Args:
+        channel: Who decodes whom.
+        t: When each row's slot ends, not when it begins, [B], [windows]: slot 0 ends at 0.5.
+        mission: Each row's mission, [B]; None is all missions in order.
     """
     # The usual radio is asked for first: to ask for a runtime protocol takes 10 µs.
     if isinstance(channel, FreeSpaceRadio) or not isinstance(channel, VaryingChannel):
         return channel
-    slot = np.rint(now * SLOTS_PER_WINDOW).astype(np.int64) - 1
-    return channel.at(slot, np.arange(len(now)) if mission is None else mission)
+    slot = np.rint(t * SLOTS_PER_WINDOW).astype(np.int64) - 1
+    return channel.at(slot, np.arange(len(t)) if mission is None else mission)
 
 
 class PlayWindow(Protocol):

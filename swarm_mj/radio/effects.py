@@ -183,7 +183,7 @@ class Fading(MissionEffect, reads=("fading", "rician_k")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Erasure(MissionEffect, reads=("erasure",)):
-    """Each receiver loses that share of the packets that it would decode."""
+    """Each receiver loses a share `erasure` of the packets that it would decode."""
 
     probability: float  # of each packet at each receiver [1]
 
@@ -201,9 +201,10 @@ class Erasure(MissionEffect, reads=("erasure",)):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Bursts(MissionEffect, reads=("burst_begin", "burst_end")):
-    """Each receiver stops receiving, with the first probability per slot, for a while.
+    """Each receiver is deaf at times, in bursts of slots.
 
-    It recovers with the second (Gilbert 1960, Elliott 1963).
+    In each slot a burst begins with the probability `burst_begin`, and ends with the probability
+    `burst_end` (Gilbert 1960, Elliott 1963).
     """
 
     begin: float  # per slot [1]
@@ -228,7 +229,7 @@ class Bursts(MissionEffect, reads=("burst_begin", "burst_end")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class HighPower(MissionEffect, reads=("high_power_fraction", "high_power_db")):
-    """This fraction of the robots, the first ones, transmits with more power."""
+    """A fraction of the robots, those of the lowest indices, transmits with more power."""
 
     num_robots: int  # that do
     extra_db: float
@@ -259,9 +260,9 @@ class HighPower(MissionEffect, reads=("high_power_fraction", "high_power_db")):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Clocks(MissionEffect, reads=("clock_offset_s", "clock_drift_ppm")):
-    """Each robot's slots begin later, by an offset that is drawn uniformly up to the first.
+    """Each robot's slots begin late, by an offset that is drawn uniformly up to `clock_offset_s`.
 
-    Clocks also drift, by up to the second, either way.
+    Clocks also drift, by up to `clock_drift_ppm`, either way.
     """
 
     offset: float  # the greatest [slots]

@@ -16,7 +16,7 @@ from swarm_mj.system.compiled import compiled
 # compiles all that it reaches twice.
 NOBODY = cast(int, np.int64(-1))
 MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
-LOGISTIC = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
+LOGISTIC_SLOPE = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
 CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never
 
 
@@ -37,9 +37,9 @@ class Air(NamedTuple):
 
 
 @compiled()
-def received_power(at_1_m: float, squared_distance_m2: float) -> float:
+def received_power(power_at_1_m: float, squared_distance_m2: float) -> float:
     """Return the power over a distance in free space, in the unit of that over 1 m (Eqs. 1-2)."""
-    return at_1_m / max(squared_distance_m2, MIN_DISTANCE_M * MIN_DISTANCE_M)
+    return power_at_1_m / max(squared_distance_m2, MIN_DISTANCE_M * MIN_DISTANCE_M)
 
 
 @compiled()
@@ -49,9 +49,9 @@ def sinr(signal: float, interference: float, noise: float) -> float:
 
 
 @compiled()
-def is_received(signal_to_noise: float, threshold: float) -> bool:
-    """Return whether a packet decodes; both ratios are linear [1] (Eq. 4)."""
-    return signal_to_noise >= threshold
+def is_received(ratio: float, threshold: float) -> bool:
+    """Return whether a packet of this SINR decodes; ratio and threshold are linear [1] (Eq. 4)."""
+    return ratio >= threshold
 
 
 @compiled()
@@ -110,18 +110,21 @@ def add_to_air(air: Air, i: int, j: int, signal: float, interference: float) -> 
 
 
 @compiled()
-def decode_probability(signal_to_noise: float, threshold: float, distance_over_std: float) -> float:
+def decode_probability(ratio: float, threshold: float, distance_over_std: float) -> float:
     """Return the probability that a packet over a believed distance decodes (Eqs. 3-4).
 
     A lone packet decodes up to some distance; interference shortens it to d sqrt(SINR /
-    threshold), so a packet over a believed d comes through if the true distance is below that.
+    threshold), so a packet over a believed d comes through if the true distance is below that. The
+    normal distribution is approximated by a logistic one.
 
-    The believed distance is given over its standard deviation; inf is certain. The normal
-    distribution is approximated by a logistic one.
+    Args:
+        ratio: The packet's SINR, if the receiver is as far away as is believed, linear [1].
+        threshold: Least SINR that decodes, linear [1].
+        distance_over_std: The believed distance over its standard deviation [1]; inf is certain.
     """
     if distance_over_std == np.inf:
-        return 1.0 if is_received(signal_to_noise, threshold) else 0.0
-    deviations = (math.sqrt(signal_to_noise / threshold) - 1.0) * distance_over_std
+        return 1.0 if is_received(ratio, threshold) else 0.0
+    deviations = (math.sqrt(ratio / threshold) - 1.0) * distance_over_std
     if abs(deviations) > CERTAIN:
         return 1.0 if deviations > 0.0 else 0.0
-    return 1.0 / (1.0 + math.exp(-LOGISTIC * deviations))
+    return 1.0 / (1.0 + math.exp(-LOGISTIC_SLOPE * deviations))

@@ -2,13 +2,13 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import PACKET_COUNTS, TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import Packets, TaskCost, WindowCosts, mean_hops
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.fields import check_kind
 
@@ -101,36 +101,61 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
     variance = [window.costs.velocity_variance_m2ps2 for window in flown]
     is_complete = np.stack([window.costs.is_complete for window in flown])
     first_complete = np.argmax(is_complete, axis=0) + 1.0
-    counted = np.sum([window.costs.packets for window in flown], axis=0)
-    packets = dict(zip(PACKET_COUNTS, counted, strict=True))
-    receptions = packets.pop("receptions")
-    num_sent = np.where(packets["sent"] > 0, packets["sent"], np.nan)
+    packets = _total_packets([window.costs.packets for window in flown])
+    num_sent = np.where(packets.sent > 0, packets.sent, np.nan)
+    task = _task_cost([window.costs.task_cost for window in flown])
     return Summary(
         num_windows=len(flown),
         aoi_mean=_mean([window.costs.age_windows for window in flown]),
         velocity_variance_mean=_mean(variance),
         velocity_variance_first=variance[0],
         velocity_variance_last=variance[-1],
-        **_task_costs([window.costs.task_cost for window in flown]),
+        task_cost_name=task.name if task else None,
+        task_cost_unit=task.unit if task else None,
+        task_cost_mean=task.mean if task else None,
+        task_cost_first=task.first if task else None,
+        task_cost_last=task.last if task else None,
         hops_mean=_mean([window.hops for window in flown]),
         complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
-        **{f"packets_{name}": count for name, count in packets.items()},
-        hearers_per_packet=receptions / num_sent,
+        packets_sent=packets.sent,
+        packets_transmitted=packets.transmitted,
+        packets_attempted=packets.attempted,
+        packets_delivered=packets.delivered,
+        packets_lost=packets.lost,
+        packets_overheard=packets.overheard,
+        packets_answered=packets.answered,
+        packets_heard=packets.heard,
+        hearers_per_packet=packets.receptions / num_sent,
     )
 
 
-def _task_costs(windows: Sequence[TaskCost | None]) -> dict[str, Any]:
-    """Return the task's costs over windows; nothing if it has none."""
+def _total_packets(windows: Sequence[Packets]) -> Packets:
+    """Return each mission's packets in all windows, count by count [packets]."""
+    return Packets._make(np.sum(windows, axis=0))
+
+
+class _TaskCosts(NamedTuple):
+    """The cost of the robots' task over a flight, as `Summary` has it."""
+
+    name: str
+    unit: str
+    mean: Float[np.ndarray, "B"]
+    first: Float[np.ndarray, "B"]
+    last: Float[np.ndarray, "B"]
+
+
+def _task_cost(windows: Sequence[TaskCost | None]) -> _TaskCosts | None:
+    """Return the task's cost over windows; None if the controller has none."""
     costs = [cost for cost in windows if cost is not None]
     if not costs:
-        return {}
-    return {
-        "task_cost_name": costs[0].name,
-        "task_cost_unit": costs[0].unit,
-        "task_cost_mean": _mean([cost.value for cost in costs]),
-        "task_cost_first": costs[0].value,
-        "task_cost_last": costs[-1].value,
-    }
+        return None
+    return _TaskCosts(
+        name=costs[0].name,
+        unit=costs[0].unit,
+        mean=_mean([cost.value for cost in costs]),
+        first=costs[0].value,
+        last=costs[-1].value,
+    )
 
 
 def _mean(windows: Sequence[Float[np.ndarray, "B"]]) -> Float[np.ndarray, "B"]:

@@ -40,7 +40,14 @@ def swarms(mission):
 
 def arrays_of(swarm, costs):
     buffers = [getattr(swarm.buffers, spec.name) for spec in fields(Buffers)]
-    return [*buffers, *swarm.phases[0], *swarm.phases[1], *costs[:4], swarm.states.position_m]
+    return [
+        *buffers,
+        *swarm.phases[0],
+        *swarm.phases[1],
+        *costs[:3],
+        *costs.packets,
+        swarm.states.position_m,
+    ]
 
 
 def equal(ours, theirs):

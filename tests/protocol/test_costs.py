@@ -11,8 +11,10 @@ from hypothesis import strategies as st
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
 from swarm_mj.protocol.costs import (
+    PACKET_COUNTS,
     age_of_information,
     mean_hops,
+    no_packets,
     velocity_variance,
     window_costs,
 )
@@ -97,6 +99,15 @@ def packets_of(first, second, *, is_broadcast):
     now = np.ones(num_missions)
     costs = window_costs(buffers, states, (first, second), now, is_broadcast=is_broadcast)
     return costs.packets
+
+
+def test_without_transmissions_all_counts_of_requests_are_0():
+    silence = np.tile(np.arange(3), (2, 1))
+    nobody = Phase(recipient=silence, heard=silence)
+    counted = packets_of(nobody, nobody, is_broadcast=False)
+    np.testing.assert_array_equal(counted.sent, [0.0, 0.0])
+    for name in PACKET_COUNTS:
+        np.testing.assert_array_equal(getattr(counted, name), no_packets(2)[name], err_msg=name)
 
 
 def depth(parent, i, j):

@@ -5,7 +5,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.costs import ROW, WindowCosts, mean_hops, no_packets
+from swarm_mj.protocol.costs import COUNTS, WindowCosts, mean_hops, no_packets
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
@@ -15,28 +15,26 @@ TRANSMITTED = np.array([4.0, 2.0])  # in each window
 
 def flown_by_hand(age, variance, is_complete, hops, packets):
     """One window of two missions; packets: attempted, delivered, lost, overheard, answered."""
-    attempted, delivered, _, overheard, answered = (np.array(count, float) for count in packets)
     counts = no_packets(2)
-    counts[ROW.sent_first] = attempted
-    counts[ROW.sent_second] = TRANSMITTED - attempted
-    counts[ROW.delivered_first] = delivered
-    counts[ROW.delivered_second] = answered
-    counts[ROW.overheard] = overheard
+    counts["transmitted"] = TRANSMITTED
+    for name, count in zip(ADDRESSED, packets, strict=True):
+        counts[name] = count
+    counts["sent"] = counts["attempted"]
     costs = WindowCosts(
         age_windows=np.array(age),
         is_complete=np.array(is_complete),
         velocity_variance_m2ps2=np.array(variance),
         counts=counts,
-        is_broadcast=False,
     )
     return WindowRecord(costs=costs, hops=np.array(hops))
 
 
 def broadcast_by_hand(window, packets):
     """The same window with broadcasts in its first phase: sent, heard, receptions."""
-    counts = no_packets(2)
-    counts[ROW.sent_first], counts[ROW.heard], counts[ROW.receptions] = packets
-    return replace(window, costs=window.costs._replace(counts=counts, is_broadcast=True))
+    counts = np.full(2, np.nan, COUNTS)
+    counts["sent"], counts["heard"], counts["receptions"] = packets
+    counts["transmitted"] = counts["sent"]
+    return replace(window, costs=window.costs._replace(counts=counts))
 
 
 THREE_WINDOWS = [

@@ -1,0 +1,78 @@
+"""The summary of one flight: each number declared once, with its unit."""
+
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from swarm_mj.system.fields import did_you_mean
+
+
+@dataclass(frozen=True, kw_only=True, eq=False, repr=False)
+class FlightSummary(dict[str, Any]):
+    """What one flight cost, by the names and in the order of `swarm-mj fly --json`.
+
+    Each number is an attribute. It is a key as well, so `summary["aoi_mean"]`, `dict(summary)` and
+    `json.dumps(summary)` do what they do with a dictionary. Counts of packets are totals, and None
+    where the policy sends no such packets: addressed ones are delivered or lost, broadcasts heard
+    or not.
+
+    Example:
+        >>> run.summary.aoi_mean == run.summary["aoi_mean"]
+        True
+    """
+
+    num_windows: int  # that were flown
+    aoi_mean: float  # age of information, mean over windows (Eq. 10) [windows]
+    velocity_variance_mean: float  # mean over windows (Eq. 17) [m²/s²]
+    velocity_variance_first: float  # after the first window [m²/s²]
+    velocity_variance_last: float  # after the last window [m²/s²]
+    task_cost_name: str | None  # as the controller calls it; None if it has none
+    task_cost_unit: str | None  # of the next three
+    task_cost_mean: float | None  # mean over windows
+    task_cost_first: float | None  # after the first window
+    task_cost_last: float | None  # after the last window
+    hops_mean: float  # depth of the parent trees, mean over windows [hops]
+    complete_window: int | None  # after which everyone had heard of everyone; None: never
+    packets_sent: int  # requests or broadcasts
+    packets_transmitted: int  # all that were on the air, responses too
+    packets_attempted: int | None  # requests
+    packets_delivered: int | None  # of these, decoded by the recipient
+    packets_lost: int | None  # and of these, not
+    packets_overheard: int | None  # receptions of what was meant for another
+    packets_answered: int | None  # responses that the first sender decoded
+    packets_heard: int | None  # broadcasts that at least one robot decoded
+    hearers_per_packet: float | None  # robots that decoded a broadcast, mean [robots]
+    packet_bytes: int  # of one packet [bytes]
+    bytes_per_second: float  # that the team transmitted [bytes/s]
+    velocity_variance_left: float | None  # last over first [1]; None if the first is 0
+    payload: str  # what packets carry beyond the sender's buffer
+    is_centralised: bool  # whether a centre that knows the truth decided
+    wall_seconds: float  # that the flight took [s]
+    interrupted: bool  # whether it ended before its last window
+    heard_share: float  # pairs of active robots that had heard of each other at the end [1]
+
+    def __post_init__(self) -> None:
+        """Make each attribute a key."""
+        for spec in fields(self):
+            self[spec.name] = getattr(self, spec.name)
+
+    def __repr__(self) -> str:
+        """Return a line for each name."""
+        return as_lines(self)
+
+    if not TYPE_CHECKING:  # to a checker, a name that is not declared is an error
+
+        def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - it only raises
+            raise AttributeError(f"there is no {name!r} here{did_you_mean(name, self)}")
+
+
+def as_lines(numbers: dict[str, Any]) -> str:
+    """Return a line for each name; what takes several lines itself is indented below its name."""
+    width = max(map(len, numbers), default=0)
+    lines: list[str] = []
+    for name, value in numbers.items():
+        shown = f"{value:.6g}" if isinstance(value, float) else str(value)
+        if isinstance(value, dict):
+            lines.append(f"{name}\n  " + shown.replace("\n", "\n  "))
+        else:
+            lines.append(f"{name:{width}}  {shown}")
+    return "\n".join(lines)
