@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Unpack
+from typing import Any, Unpack
 
 from swarm_mj.mission.specification import OPEN, Mission, MissionFields, Task, TaskAndFields
 from swarm_mj.system.fields import check_value
