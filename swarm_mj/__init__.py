@@ -46,87 +46,27 @@ is seen), `envs` (interfaces of other libraries), `api` (Python in five lines; i
 as well), `cli` (the command line).
 """
 
-import signal
-import sys
 from importlib import import_module
-from importlib.util import find_spec
-from typing import TYPE_CHECKING
 
-if TYPE_CHECKING:
-    from swarm_mj.api.evaluate import Evaluation, evaluate
-    from swarm_mj.api.fly import fly
-    from swarm_mj.api.run import Run
-    from swarm_mj.mission import Mission, paper, reference
-    from swarm_mj.policies import (
-        POLICIES,
-        BroadcastPolicy,
-        CentralisedPolicy,
-        DecentralisedPolicy,
-        LocalViews,
-        Policy,
-        make_policy,
-    )
-    from swarm_mj.simulation.link import Link
-    from swarm_mj.simulation.rollout import summarise
-    from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.after_import import after_import
+from swarm_mj.system.lazy_names import attach_stub
 
-    __version__: str
-
-__all__ = [
-    "POLICIES",
-    "BroadcastPolicy",
-    "CentralisedPolicy",
-    "DecentralisedPolicy",
-    "Evaluation",
-    "Link",
-    "LocalViews",
-    "Mission",
-    "Policy",
-    "Run",
-    "Swarm",
-    "evaluate",
-    "fly",
-    "make_policy",
-    "paper",
-    "reference",
-    "summarise",
-]
-
-# Where each name is; a module is imported when a name of it is first asked for.
-_HOMES = {
-    "api.evaluate": ("Evaluation", "evaluate"),
-    "api.fly": ("fly",),
-    "api.run": ("Run",),
-    "mission": ("Mission", "paper", "reference"),
-    "policies": (
-        *("POLICIES", "BroadcastPolicy", "CentralisedPolicy", "DecentralisedPolicy"),
-        *("LocalViews", "Policy", "make_policy"),
-    ),
-    "simulation.link": ("Link",),
-    "simulation.rollout": ("summarise",),
-    "simulation.swarm": ("Swarm",),
-}
+# The public names are those of `__init__.pyi`, and nowhere else. Type checkers and editors read
+# them there, and so does this; each module is imported when a name of it is first asked for.
+_public_name, __dir__, __all__ = attach_stub(__name__, __file__)
 
 
 def __getattr__(name: str) -> object:
-    """Return a name of `__all__`, or the version, when it is first asked for."""
+    """Return a public name, or the version, when it is first asked for."""
     if name == "__version__":
         return import_module("swarm_mj.system.packages").version()
-    for home, names in _HOMES.items():
-        if name in names:
-            return getattr(import_module(f"swarm_mj.{home}"), name)
-    raise AttributeError(f"module 'swarm_mj' has no attribute {name!r}", name=name)
+    return _public_name(name)
 
 
-def __dir__() -> list[str]:
-    return sorted({*globals(), *__all__, "__version__"})
-
-
-_started = [*sys.orig_argv, "", ""][1:3]
-_is_command = _started[0].endswith("swarm-mj") or _started == ["-m", "swarm_mj"]
-if not _is_command and find_spec("gymnasium"):  # whose `make` then knows the environments
+def _register_environments() -> None:
     import_module("swarm_mj.envs").register_environments()
-if _is_command and signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-    # Nothing has begun: Ctrl-C ends the process at once and silently until `cli.main` hears it. An
-    # exception would be swallowed by some of what is loaded.
-    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
+# `gymnasium.make` then knows the environments, whichever of the two is imported first; who does
+# without Gymnasium does not wait for it.
+after_import("gymnasium", _register_environments)

@@ -141,6 +141,27 @@ FOR_THE_TYPE_CHECKER = [
         after='        hepl="largest drift of a clock",',
         said='No parameter named "hepl"',
     ),
+    Mistake(
+        name="a misspelt keyword of swarm_mj.fly",
+        file="tools/same.py",
+        before='swarm_mj.fly(flight.task, policy="tdma",',
+        after='swarm_mj.fly(flight.task, polcy="tdma",',
+        said='No parameter named "polcy"',
+    ),
+    Mistake(
+        name="a misspelt field of a preset's mission",
+        file="swarm_mj/cli/bench_learning.py",
+        before='paper("stationary", num_robots=num_robots)',
+        after='paper("stationary", num_robot=num_robots)',
+        said='No parameter named "num_robot"',
+    ),
+    Mistake(
+        name="a field of a mission that has another type",
+        file="tools/diagrams.py",
+        before='paper("stationary", num_robots=2)',
+        after='paper("stationary", num_robots="2")',
+        said='Argument of type "Literal[\'2\']" cannot be assigned to parameter "num_robots"',
+    ),
 ]
 
 EFFECTS = "tests/radio/test_effects.py"
@@ -161,6 +182,17 @@ DISTANCE = '    distance: Annotated[float, Feature("distance")]  # of `FAR_RANGE
 AGE = '    timestamp_age: Annotated[float, Feature("age of T")]\n'
 
 FOR_TESTS = [
+    Mistake(
+        name="a mission field that type checkers are not told of",
+        file="swarm_mj/mission/specification.py",
+        before="    erasure: float\n",
+        after="",
+        caught_by=(
+            "tests/mission/test_specification.py"
+            "::test_type_checkers_are_told_of_every_field_by_its_type"
+        ),
+        said="MissionFields lacks the line `erasure: ",
+    ),
     Mistake(
         name="a layer of replays whose path is misspelt",
         file="swarm_mj/replay/layers.py",

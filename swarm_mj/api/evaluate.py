@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Unpack
 
 from swarm_mj.api.fly import mission_of
 from swarm_mj.api.run import Metrics
@@ -14,7 +14,7 @@ from swarm_mj.evaluation.results import Evaluated, Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
-from swarm_mj.mission import Mission
+from swarm_mj.mission import Mission, PresetAndFields
 from swarm_mj.policies.registry import listed
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.memory import policy_memory
@@ -159,7 +159,7 @@ def evaluate(
     num_jobs: int = 1,
     engine: str = "local",
     address: str | None = None,
-    **mission_fields: Any,
+    **mission_fields: Unpack[PresetAndFields],
 ) -> Evaluation:
     """Fly each policy over the same missions, and average the costs of each.
 

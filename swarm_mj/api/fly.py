@@ -2,15 +2,15 @@
 
 import inspect
 import warnings
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 from swarm_mj.api.flight import Flight, flight_needs, fly_mission
 from swarm_mj.api.run import Run
 from swarm_mj.control.motion import Controller
-from swarm_mj.mission import Mission, make_mission
+from swarm_mj.mission import Mission, PresetAndFields, make_mission
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
@@ -34,7 +34,7 @@ def fly(
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
     features: str | Sequence[str] = (),
-    **mission_fields: Any,
+    **mission_fields: Unpack[PresetAndFields],
 ) -> Run:
     """Fly one mission, from the first window to the last.
 
@@ -110,7 +110,7 @@ def fly(
 
 
 def mission_of(
-    function: Callable[..., Any], task: str | Mission | None, mission_fields: Mapping[str, Any]
+    function: Callable[..., Any], task: str | Mission | None, mission_fields: PresetAndFields
 ) -> Mission:
     """Return the mission that a function's arguments name; TypeError for fields it cannot have."""
     parameters = inspect.signature(function).parameters.values()

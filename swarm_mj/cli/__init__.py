@@ -16,7 +16,7 @@ from typing import Any, NoReturn
 
 # All else is imported by functions that `main` calls, which hears Ctrl-C while modules load.
 from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
-from swarm_mj.system.interrupt import INTERRUPTS, interruptible
+from swarm_mj.system.interrupt import INTERRUPTS, interruptible, raise_if_interrupted
 from swarm_mj.system.streams import lasting_streams
 
 NAME = "swarm-mj"
@@ -66,6 +66,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
     def work() -> int:
         run, options = parse(sys.argv[1:] if arguments is None else list(arguments))
+        raise_if_interrupted()  # some of what was loaded may have swallowed it
         return run(options)
 
     return _exit_code(NAME, work)
@@ -147,7 +148,9 @@ def _outcome(work: Callable[[], int], was_interrupted: Callable[[], bool]) -> tu
         from swarm_mj.system.user_code import one_line_each
 
         with one_line_each():
-            return work(), ""
+            code = work()
+        raise_if_interrupted()  # work loads modules, too
+        return code, ""
     except SystemExit as end:  # of help, or of a line that cannot be read
         return int(end.code or DONE), ""
     except Exception as error:

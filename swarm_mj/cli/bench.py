@@ -15,6 +15,7 @@ from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
 from swarm_mj.policies.registry import POLICIES, SHIPPED
 from swarm_mj.system.fields import setting
+from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import commit, is_installed, need, version
 from swarm_mj.system.terminal import num_cores, plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, write_json
@@ -81,6 +82,7 @@ def run(options: BenchOptions) -> int:
     with Console(stderr=True).status("Measuring ...") as status:
         tables_of = _team_tables if options.robots or options.plot else _tables
         for table in tables_of(options, status.update):
+            raise_if_interrupted()  # what a table loaded may have swallowed it
             tables.append(table)
             steps_us.append(sim.plain_step_us(options.seconds / 4))
     Console(highlight=False).print(*map(_table, tables), sep="\n")

@@ -8,6 +8,7 @@ from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.terminal import plain_console, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_text
 
@@ -28,6 +29,7 @@ def run(options: SceneOptions) -> int:
     from swarm_mj.physics.scene import compose  # MuJoCo is slow to import
     from swarm_mj.simulation.swarm import Swarm
 
+    raise_if_interrupted()  # before a file is written: what was loaded may have swallowed it
     mission = options.mission
     check_outputs(Output("scene", options.out, ".xml|.mjcf"), must_be_new=not options.force)
     swarm = Swarm(mission, [options.seed], scene=options.scene)

@@ -6,7 +6,7 @@ The vector environment and PettingZoo's draw on the same screen.
 import copy
 import time
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Unpack
 
 import gymnasium
 import numpy as np
@@ -15,7 +15,7 @@ from gymnasium.utils import EzPickle
 from jaxtyping import Bool, UInt8
 
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
-from swarm_mj.envs.options import make_team_batch, team_spaces
+from swarm_mj.envs.options import BatchOptions, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
@@ -89,7 +89,11 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
     _spec: EnvSpec | None = None
 
     def __init__(
-        self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
+        self,
+        mission: Mission | str = "flocking",
+        *,
+        render_mode: str | None = None,
+        **options: Unpack[BatchOptions],
     ) -> None:
         """Take a mission or its task, and options of `make_batch`; raises as that does."""
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)

@@ -6,7 +6,7 @@ Missions that begin together are one batch, played as one swarm. A mission that 
 
 from collections.abc import Sequence
 from numbers import Number
-from typing import Any, cast
+from typing import Any, Unpack, cast
 
 import numpy as np
 from gymnasium.utils import EzPickle, seeding
@@ -16,7 +16,7 @@ from jaxtyping import Int, UInt8
 
 from swarm_mj.envs.gymnasium import Screen, rendering
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next, seeds_from
-from swarm_mj.envs.options import make_team_batch, team_spaces
+from swarm_mj.envs.options import BatchOptions, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set
 from swarm_mj.system.fields import check_names
@@ -40,7 +40,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         render_mode: str | None = None,
-        **options: Any,
+        **options: Unpack[BatchOptions],
     ) -> None:
         """Take B, a mission or its task, and options of `make_batch`; raises as that does."""
         modes = {"autoreset_mode": autoreset_mode, "render_mode": render_mode}

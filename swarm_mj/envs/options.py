@@ -2,7 +2,7 @@
 
 import copy
 from numbers import Integral
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium import spaces
@@ -11,7 +11,7 @@ from jaxtyping import Float32
 
 from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
-from swarm_mj.mission import MISSION_DISTANCE_M, Mission, make_mission
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission, TaskAndFields, make_mission
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
@@ -26,6 +26,21 @@ from swarm_mj.system.fields import check_choice
 NUM_OWN = 5  # numbers of a robot itself in `truth`: x, y, their velocities, whether it is active
 
 
+class BatchOptions(TaskAndFields, total=False):
+    """Keywords of `make_batch`, which says what they mean, for functions that pass them on.
+
+    They are written out for type checkers, as `MissionFields` is; a test holds them equal.
+    """
+
+    preset: str | None
+    features: str
+    reward: str
+    with_parents: bool
+    channel: Channel | str | None
+    controller: Controller | str | None
+    scene: Scene | str | None
+
+
 def make_batch(
     mission: Mission | str = "flocking",
     num_missions: int = 1,
@@ -37,7 +52,7 @@ def make_batch(
     channel: Channel | str | None = None,
     controller: Controller | str | None = None,
     scene: Scene | str | None = None,
-    **fields: Any,
+    **fields: Unpack[TaskAndFields],
 ) -> MissionBatch:
     """Return missions that have not begun, by the options that all environments share.
 
@@ -84,7 +99,9 @@ def make_batch(
     )
 
 
-def make_team_batch(mission: Mission | str, num_missions: int = 1, **options: Any) -> MissionBatch:
+def make_team_batch(
+    mission: Mission | str, num_missions: int = 1, **options: Unpack[BatchOptions]
+) -> MissionBatch:
     """Return a `make_batch` where the agent is the team; refuse rewards of single robots."""
     batch = make_batch(mission, num_missions, **options)
     if batch.reward == "credit":

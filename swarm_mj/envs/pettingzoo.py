@@ -1,6 +1,6 @@
 """PettingZoo's interface: every robot is an agent, `robot_0` to `robot_{N-1}`."""
 
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 from gymnasium import Space
@@ -10,7 +10,7 @@ from pettingzoo import ParallelEnv
 
 from swarm_mj.envs.gymnasium import MODES, Screen, modes_here, rendering
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
-from swarm_mj.envs.options import make_batch, robot_spaces, truth, truth_space
+from swarm_mj.envs.options import BatchOptions, make_batch, robot_spaces, truth, truth_space
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.checks import check_robots
 
@@ -28,7 +28,11 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     metadata: dict[str, Any] = NAME | rendering(Mission(), MODES)
 
     def __init__(
-        self, mission: Mission | str = "flocking", *, render_mode: str | None = None, **options: Any
+        self,
+        mission: Mission | str = "flocking",
+        *,
+        render_mode: str | None = None,
+        **options: Unpack[BatchOptions],
     ) -> None:
         """Take a mission, and how it is shown and paid.
 
@@ -193,12 +197,18 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         return views, {agent: dict(info) for agent in self.agents}
 
 
-def parallel_env(mission: Mission | str = "flocking", **options: Any) -> SwarmParallelEnv:
+def parallel_env(
+    mission: Mission | str = "flocking",
+    *,
+    render_mode: str | None = None,
+    **options: Unpack[BatchOptions],
+) -> SwarmParallelEnv:
     """Return a mission as PettingZoo's `ParallelEnv`, by the usual name; see the class.
 
     Args:
         mission: The mission, or its task.
-        **options: As of `SwarmParallelEnv`: `render_mode`, and the options of `make_batch`.
+        render_mode: As of `SwarmParallelEnv`.
+        **options: As of `make_batch`: the reward, the features, and any field of `Mission`.
 
     Returns:
         The environment; `reset` begins its first mission.
@@ -210,4 +220,4 @@ def parallel_env(mission: Mission | str = "flocking", **options: Any) -> SwarmPa
     Example:
         >>> env = parallel_env("random-walk", num_robots=10, reward="credit")
     """
-    return SwarmParallelEnv(mission, **options)
+    return SwarmParallelEnv(mission, render_mode=render_mode, **options)

@@ -5,7 +5,7 @@ An environment is one robot, or one team. All missions begin and end together.
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import Any, Unpack
 
 import stable_baselines3
 from stable_baselines3.common.base_class import BaseAlgorithm
@@ -14,7 +14,13 @@ from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
 from torch import nn
 
 from swarm_mj.envs.mission_batch import MissionBatch
-from swarm_mj.envs.options import make_batch, make_team_batch, robot_spaces, team_spaces
+from swarm_mj.envs.options import (
+    BatchOptions,
+    make_batch,
+    make_team_batch,
+    robot_spaces,
+    team_spaces,
+)
 from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import Activation, MlpConfig, MlpShape
@@ -32,7 +38,7 @@ def make_vec_env(
     *,
     agent: str = "robot",
     seed: int | None = None,
-    **options: Any,
+    **options: Unpack[BatchOptions],
 ) -> SwarmVecEnv:
     """Return B missions for stable-baselines3, with `action_masks()` for `MaskablePPO`.
 

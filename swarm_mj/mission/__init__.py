@@ -1,7 +1,15 @@
 """The mission (IV-B): its numbers, its presets, and what is drawn before it begins."""
 
 from swarm_mj.mission.presets import PAPERS, PRESETS, WORLDS, make_mission, paper, reference
-from swarm_mj.mission.specification import MISSION_DISTANCE_M, FlockingSet, Mission, Task
+from swarm_mj.mission.specification import (
+    MISSION_DISTANCE_M,
+    FlockingSet,
+    Mission,
+    MissionFields,
+    PresetAndFields,
+    Task,
+    TaskAndFields,
+)
 
 __all__ = [
     "MISSION_DISTANCE_M",
@@ -10,7 +18,10 @@ __all__ = [
     "WORLDS",
     "FlockingSet",
     "Mission",
+    "MissionFields",
+    "PresetAndFields",
     "Task",
+    "TaskAndFields",
     "make_mission",
     "paper",
     "reference",

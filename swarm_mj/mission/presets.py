@@ -2,13 +2,13 @@
 
 from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
+from typing import Any, Unpack
 
-from swarm_mj.mission.specification import OPEN, Mission, Task
+from swarm_mj.mission.specification import OPEN, Mission, MissionFields, Task, TaskAndFields
 from swarm_mj.system.fields import check_value
 
 
-def paper(task: Task = "flocking", **overrides: Any) -> Mission:
+def paper(task: Task = "flocking", **overrides: Unpack[MissionFields]) -> Mission:
     """Return the paper's text, taken literally.
 
     Unless overridden, a flock has no boundary. In an arena with obstacles it has one, and physics
@@ -32,7 +32,7 @@ def paper(task: Task = "flocking", **overrides: Any) -> Mission:
     return _overridden(Mission(task=task), overrides)
 
 
-def reference(task: Task = "flocking", **overrides: Any) -> Mission:
+def reference(task: Task = "flocking", **overrides: Unpack[MissionFields]) -> Mission:
     """Return the setting of the authors' published code and numbers.
 
     Args:
@@ -70,7 +70,7 @@ def reference(task: Task = "flocking", **overrides: Any) -> Mission:
 # shadowing) and 7.5-6 (correlation distances, K in dB: 9 of UMi, 7 of InH and RMa).
 
 
-def indoor(task: Task = "random-walk", **overrides: Any) -> Mission:
+def indoor(task: Task = "random-walk", **overrides: Unpack[MissionFields]) -> Mission:
     """Return a mission on an office floor.
 
     Free space between light walls is the multi-wall model (COST 231 1999, section 4.7).
@@ -103,7 +103,7 @@ def indoor(task: Task = "random-walk", **overrides: Any) -> Mission:
     return _overridden(floor, overrides)
 
 
-def urban(task: Task = "random-walk", **overrides: Any) -> Mission:
+def urban(task: Task = "random-walk", **overrides: Unpack[MissionFields]) -> Mission:
     """Return a mission in street canyons between blocks.
 
     UMi: 32.4 + 21 log10(d) + 20 log10(f) is free space up to 1 m. A block of 25 dB then is its
@@ -140,7 +140,7 @@ def urban(task: Task = "random-walk", **overrides: Any) -> Mission:
     return _overridden(streets, overrides)
 
 
-def open_field(task: Task = "random-walk", **overrides: Any) -> Mission:
+def open_field(task: Task = "random-walk", **overrides: Unpack[MissionFields]) -> Mission:
     """Return a mission on an open field.
 
     Two-ray ground (Rappaport 2002), antennas as high as 3GPP's users carry theirs; K of RMa.
@@ -171,11 +171,11 @@ def open_field(task: Task = "random-walk", **overrides: Any) -> Mission:
     return _overridden(field, overrides)
 
 
-def _overridden(preset: Mission, overrides: dict[str, Any]) -> Mission:
+def _overridden(preset: Mission, overrides: MissionFields) -> Mission:
     """Return a preset's mission with other fields, and the walls and physics that go with them."""
     is_open = overrides.get("arena", preset.arena) == OPEN
     is_touching = not is_open or overrides.get("collide", preset.collide)
-    usual: dict[str, Any] = {
+    usual: MissionFields = {
         # The paper's flocks fly off freely; obstacles only make sense where robots stay.
         "boundary": "none" if preset.flocks and is_open else "reflect",
         "physics": "contact" if is_touching else "exact",
@@ -193,7 +193,11 @@ PRESETS = PAPERS | WORLDS
 
 
 def make_mission(
-    mission: Mission | str | None = None, /, *, preset: str | None = None, **given: Any
+    mission: Mission | str | None = None,
+    /,
+    *,
+    preset: str | None = None,
+    **given: Unpack[TaskAndFields],
 ) -> Mission:
     """Return the mission that arguments name, be they of Python, a file or a command line.
 
@@ -222,16 +226,17 @@ def make_mission(
                 f"the preset {mission.preset}; leave it out"
             )
         return replace(mission, **given) if given else mission
+    named: dict[str, Any] = dict(given)  # a task may be any text until it is checked
     if mission is not None:
-        if "task" in given:
+        if "task" in named:
             # In Python's words: `mission` is where it was given first.
             raise TypeError("a mission got multiple values for keyword argument 'task'")
-        given["task"] = mission
+        named["task"] = mission
     if preset is None:
         preset = Mission().preset
     # The fields' own messages refuse what is unknown, before it is looked up.
     specs = Mission.__dataclass_fields__
     check_value(specs["preset"], preset)
-    if "task" in given:
-        check_value(specs["task"], given["task"])
-    return PRESETS[preset](**given)
+    if "task" in named:
+        check_value(specs["task"], named["task"])
+    return PRESETS[preset](**named)

@@ -6,7 +6,7 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from dataclasses import dataclass
-from typing import Any, Literal, get_args
+from typing import Any, Literal, TypedDict, get_args
 
 from swarm_mj.system.fields import (
     above_zero,
@@ -144,7 +144,7 @@ class Mission:
     )
     num_windows: int = setting(
         500,
-        "length, in windows of 100 ms",
+        "length, in windows, usually of 100 ms",
         label="number of windows",
         unit="windows",
         low=1,
@@ -426,7 +426,7 @@ class Mission:
     # What fits into a slot.
     bit_rate: float | None = setting(
         None,
-        "in bit/s, as 250k or 6M; what does not fit into a slot of 50 ms is not sent",
+        "in bit/s, as 250k or 6M; what does not fit into a slot, half a window, is not sent",
         label="bit rate",
         unit="bit/s",
         low=1.0,
@@ -583,3 +583,69 @@ class Mission:
     def flocks(self) -> bool:
         """True if the robots are to agree on one velocity (IV-A)."""
         return self.task == "flocking"
+
+
+class MissionFields(TypedDict, total=False):
+    """Fields of `Mission`, as keywords of functions that make one; `Mission` says what they mean.
+
+    A type checker refuses a misspelt keyword by this, and an editor completes it. It reads no code,
+    so names and types are written out once more; a test holds them equal to those of `Mission`.
+    The preset and the task stand apart, for many functions have a parameter of that name, and a
+    keyword can be declared in one place only (PEP 692).
+    """
+
+    num_robots: int
+    density_per_km2: float
+    range_ratio: float
+    velocity_ratio: float
+    max_acceleration_mps2: float
+    window_s: float
+    num_windows: int
+    sinr_threshold_db: float
+    noise_dbm: float
+    sensing_dbm: float | None
+    frequency_hz: float
+    position_noise_m: float
+    position_noise_s: float
+    failure_fraction: float
+    arena: str
+    path_loss: PathLossLaw
+    loss_exponent: float
+    reference_m: float
+    antenna_height_m: float
+    shadowing_db: float
+    shadowing_distance_m: float
+    fading: FadingLaw
+    rician_k: float
+    erasure: float
+    burst_begin: float
+    burst_end: float
+    high_power_fraction: float
+    high_power_db: float
+    clock_offset_s: float
+    clock_drift_ppm: float
+    prior_knowledge: str
+    map_offset_m: float
+    bit_rate: float | None
+    physics: PhysicsMode
+    collide: bool
+    boundary: Boundary
+    wall_hit: WallHit
+    half_duplex: HalfDuplex
+    flocking_set: FlockingSet
+    silence_is_attempt: bool
+    moves_each_transmission: bool
+    tree_recomputed: bool
+    tree_root_transmits: bool
+
+
+class PresetAndFields(MissionFields, total=False):
+    """Keywords of functions that take the task by a parameter."""
+
+    preset: str
+
+
+class TaskAndFields(MissionFields, total=False):
+    """Keywords of functions that take the preset by a parameter."""
+
+    task: Task

@@ -1,3 +1,6 @@
-"""How a command ends: done, the machine failed, bad input, interrupted."""
+"""How a command ends, for scripts to read."""
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE = 0
+FAILED = 1  # the machine: memory, a disk, a library that is missing
+BAD_INPUT = 2  # what was asked for, as argparse has it, too
+INTERRUPTED = 130  # by Ctrl-C, SIGTERM or a hang-up: 128 + SIGINT, as shells have it

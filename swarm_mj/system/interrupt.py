@@ -11,6 +11,16 @@ _pressed = [False]  # whether Ctrl-C was pressed within `interruptible`
 INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
+def end_on_interrupt() -> None:
+    """Let Ctrl-C end this process at once and silently, until `interruptible` hears it.
+
+    Python would raise an exception, which some modules swallow while they load. A handler that a
+    program has set stays, and so does a job's shield from Ctrl-C.
+    """
+    if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+        signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 @contextmanager
 def interruptible() -> Iterator[Callable[[], bool]]:
     """Let SIGTERM and a hang-up within it interrupt as Ctrl-C does, if they would end the process.
@@ -31,7 +41,10 @@ def interruptible() -> Iterator[Callable[[], bool]]:
 
 
 def raise_if_interrupted() -> None:
-    """Raise KeyboardInterrupt if Ctrl-C was pressed earlier, and a library swallowed it."""
+    """Raise KeyboardInterrupt if Ctrl-C was pressed within `interruptible`, and was swallowed.
+
+    Modules do so that catch every exception while they load, and so do some libraries.
+    """
     if _pressed[0]:
         raise KeyboardInterrupt
 

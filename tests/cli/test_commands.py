@@ -4,6 +4,8 @@ import ctypes
 import os
 import signal
 import time
+from contextlib import suppress
+from importlib import import_module
 
 import pytest
 
@@ -65,3 +67,20 @@ def test_what_a_library_makes_of_an_interruption_is_one(kind, capsys):
 def test_without_an_interruption_a_fault_of_the_code_is_raised():
     with pytest.raises(ZeroDivisionError):
         _exit_code("some", lambda: 1 // 0)
+
+
+@pytest.mark.parametrize("command", ["bench", "doctor", "policies", "scene"])
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
+def test_an_interruption_that_is_swallowed_while_modules_load_ends_a_command(
+    monkeypatch, capsys, command, number
+):
+    """Some modules catch every exception while they load, so commands ran on to their ends."""
+
+    def loading(name):
+        with suppress(KeyboardInterrupt):
+            signal.raise_signal(number)
+        return import_module(name)
+
+    monkeypatch.setattr("swarm_mj.cli.importlib.import_module", loading)
+    assert main([command]) == INTERRUPTED
+    assert capsys.readouterr().out == ""

@@ -3,7 +3,7 @@
 import inspect
 import re
 from pathlib import Path
-from typing import get_args
+from typing import get_args, get_type_hints
 
 import gymnasium
 import numpy as np
@@ -12,8 +12,8 @@ from gymnasium import spaces
 
 from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
-from swarm_mj.envs.options import make_batch, robot_spaces, team_spaces
-from swarm_mj.mission import Task
+from swarm_mj.envs.options import BatchOptions, make_batch, robot_spaces, team_spaces
+from swarm_mj.mission import Task, TaskAndFields
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.graphs import PaperFeatures
 
@@ -45,6 +45,12 @@ REFUSED = {
 def test_what_is_refused(complaint):
     with pytest.raises((ValueError, TypeError), match=complaint):
         REFUSED[complaint]()
+
+
+def test_type_checkers_are_told_of_the_options_that_interfaces_pass_on():
+    parameters = inspect.signature(make_batch).parameters.values()
+    own = {each.name: each.annotation for each in parameters if each.kind is each.KEYWORD_ONLY}
+    assert get_type_hints(BatchOptions) == own | get_type_hints(TaskAndFields)
 
 
 OWN = """

@@ -81,17 +81,17 @@ def test_a_training_can_be_resumed(forks, random_tries):
 
 
 def pressed(folder, delay_s, *arguments):
-    """Runs a command that gets Ctrl-C so long after its package began to load; returns its end."""
+    """Runs a command that gets Ctrl-C so long after it began; returns its end."""
     with subprocess.Popen(
         [sys.executable, "-m", "swarm_mj", *map(str, arguments)],
         cwd=folder,
-        env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"},  # which says when it has loaded
+        env=os.environ | {"PYTHONPROFILEIMPORTTIME": "1"},  # which says when it has begun
         stdout=subprocess.DEVNULL,
         stderr=subprocess.PIPE,
         text=True,
         preexec_fn=lambda: signal.signal(signal.SIGINT, signal.SIG_DFL),
     ) as process:
-        while not process.stderr.readline().endswith(" swarm_mj\n"):
+        while not process.stderr.readline().endswith(" swarm_mj.system.interrupt\n"):
             assert process.poll() is None
         time.sleep(delay_s)
         process.send_signal(signal.SIGINT)

@@ -3,12 +3,19 @@
 import math
 import runpy
 from dataclasses import FrozenInstanceError, fields
-from typing import Literal, get_args, get_origin
+from typing import Literal, get_args, get_origin, get_type_hints
 
 import numpy as np
 import pytest
 
-from swarm_mj.mission import Mission, paper, reference
+from swarm_mj.mission import (
+    Mission,
+    MissionFields,
+    PresetAndFields,
+    TaskAndFields,
+    paper,
+    reference,
+)
 from swarm_mj.mission import specification as mission_module
 from swarm_mj.system.fields import about_of, former_names, kind_of
 
@@ -96,6 +103,19 @@ def test_every_field_names_its_source_and_the_choices_of_its_type(spec):
     assert about.source
     if get_origin(spec.type) is Literal:
         assert about.choices == get_args(spec.type)
+
+
+def test_type_checkers_are_told_of_every_field_by_its_type():
+    """One that is missing is a misspelt keyword to them; a wrong type, a wrong complaint."""
+    declared = {spec.name: spec.type for spec in fields(Mission)}
+    own = {"preset": declared.pop("preset"), "task": declared.pop("task")}
+    told = get_type_hints(MissionFields)
+    for name, kind in declared.items():
+        assert told.get(name) == kind, f"MissionFields lacks the line `{name}: {kind}`"
+    assert list(told) == list(declared), "MissionFields has the fields of Mission, in their order"
+    assert get_type_hints(PresetAndFields) == declared | {"preset": own["preset"]}
+    assert get_type_hints(TaskAndFields) == declared | {"task": own["task"]}
+    assert not MissionFields.__required_keys__
 
 
 CHANNEL_FIELDS = [
