@@ -22,6 +22,7 @@ from swarm_mj.evaluation.figures.drawing import draw_curves
 from swarm_mj.evaluation.figures.style import FAINT, save
 from swarm_mj.evaluation.published import TEAM_SIZE
 from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.protocol.mission_costs import AOI
 from swarm_mj.system.fields import setting
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -73,7 +74,7 @@ def table(folder: Path) -> str:
 
 def own_curves(found: Sequence[Result]) -> list[Curve]:
     """Return the policies' curves without the published ones."""
-    every = curves(FIGURE, "aoi", results_of(FIGURE, found))
+    every = curves(FIGURE, AOI, results_of(FIGURE, found))
     return [curve for curve in every if not curve.is_published]
 
 

@@ -13,7 +13,7 @@ from statistics import mean
 
 import numpy as np
 
-from swarm_mj.api.charts import draw_learning
+from swarm_mj.api.charts import LearningCurve, draw_learning
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.style import save
@@ -53,11 +53,12 @@ class LearningFigure:
         check_outputs(*(Output("figure", path) for path in paths))
         quiet_matplotlib()
         rows = read_curve(self.results / CURVE)
-        age, error = (np.array([row[name] for row in rows]) for name in ("aoi", "aoi_sem"))
+        age = np.array([row["aoi"] for row in rows])
+        error = np.array([row["aoi_sem"] for row in rows])
         decisions = np.array([row["decisions"] for row in rows])
-        lines = {LABEL: np.array([decisions, age, age - error, age + error])}
+        curve = LearningCurve(decisions=decisions, age=age, low=age - error, high=age + error)
         levels = read_levels(self.results / "shipped-gnn.csv")
-        figure = draw_learning(lines, ages(levels), caption(levels))
+        figure = draw_learning({LABEL: curve}, ages(levels), caption(levels))
         for path in paths:
             save(figure, path)
         return 0

@@ -2,6 +2,7 @@
 
 import textwrap
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from itertools import groupby
 
 import matplotlib.pyplot as plt
@@ -14,8 +15,15 @@ from matplotlib.ticker import LogLocator
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures import style
 from swarm_mj.evaluation.figures.style import look_of
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, is_flock
+from swarm_mj.evaluation.results import (
+    CARRIES_MORE,
+    Result,
+    carries_more,
+    is_flock,
+    statistics_of,
+)
 from swarm_mj.evaluation.table import missions_of
+from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 
 Course = Float[np.ndarray, "T"]
 
@@ -28,7 +36,6 @@ CHARACTERS = 92  # of a line of a title
 FOOT_IN = 0.2
 UNHEARD = "#eef0f4"  # behind the windows before everyone has heard of everyone
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
-LABELS = {"aoi": "age of information\n[windows]", "velocity_variance": "velocity variance\n[m²/s²]"}
 
 
 def draw_flight(
@@ -51,7 +58,7 @@ def draw_flight(
         The figure, 7.5 inches wide.
     """
     colour = look_of(policy).colour
-    number = 2 if own_cost else 1
+    number = 2 if own_cost else 1  # of panels
     with style.styled():
         figure, axes = _axes(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
         for each in axes:
@@ -62,8 +69,9 @@ def draw_flight(
             cost = columns["task_cost"]
             least = 0.0
             axes[1].plot(columns["window"], cost, color=colour)
-            axes[1].set_ylabel(f"{name}\n[{unit}]")
+            axes[1].set_ylabel(_two_lines(name, unit))
             if name == Flocking.cost_name:
+                # It falls by orders of magnitude while a flock agrees.
                 axes[1].set_yscale("log")
                 # Far below its largest value the variance of a converged flock is rounding noise.
                 least = max(float(np.min(cost)), MIN_SHARE * float(np.max(cost))) / 2.0
@@ -81,31 +89,44 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
     Returns:
         The figure: a chart for each kind of missions, with its title, below each other.
     """
-    groups = {said: list(its) for said, its in groupby(results, missions_of)}
-    titles = [textwrap.wrap(said, CHARACTERS, break_on_hyphens=False) for said in groups]
-    heights_in = []
-    for title, shown in zip(titles, groups.values(), strict=True):
+    groups: list[list[Result]] = []
+    titles: list[list[str]] = []  # in lines
+    heights_in: list[float] = []
+    for said, its in groupby(results, missions_of):
+        shown = sorted(its, key=lambda result: result.aoi_mean)
+        title = textwrap.wrap(said, CHARACTERS, break_on_hyphens=False)
+        groups.append(shown)
+        titles.append(title)
         heights_in.append(HEAD_IN + LINE_IN * (len(title) - 1) + ROW_IN * len(shown))
     with style.styled():
         size_in = style.WIDTH_IN, sum(heights_in) + FOOT_IN
         figure = plt.figure(figsize=size_in, layout="constrained")
         parts = figure.subfigures(len(groups), 1, height_ratios=heights_in, squeeze=False)
-        for part, title, shown in zip(parts.flat, titles, groups.values(), strict=True):
+        for part, title, shown in zip(parts.flat, titles, groups, strict=True):
             said = style.escape_mathtext("\n".join(title))
             part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
-            _draw_policies(part, sorted(shown, key=lambda result: result.aoi_mean))
+            _draw_policies(part, shown)
         style.write_caption(figure, _origin(results))
     return kept(figure)
 
 
+@dataclass(frozen=True, kw_only=True, eq=False)
+class LearningCurve:
+    """The age of information while policies learned, with a band around it."""
+
+    decisions: Float[np.ndarray, "X"]  # of teams
+    age: Float[np.ndarray, "X"]  # [windows]
+    low: Float[np.ndarray, "X"]  # the band's lower end [windows]
+    high: Float[np.ndarray, "X"]  # and its upper end [windows]
+
+
 def draw_learning(
-    lines: Mapping[str, Float[np.ndarray, "4 X"]], levels: Mapping[str, float], origin: str
+    lines: Mapping[str, LearningCurve], levels: Mapping[str, float], origin: str
 ) -> Figure:
     """Return a chart of learning curves, and policies' ages as levels, on the same missions.
 
     Args:
-        lines: By their labels, each with the team decisions, the ages, and the lower and the
-            upper end of their band [windows].
+        lines: The curves by their labels.
         levels: The ages of policies by their names [windows].
         origin: Where the numbers are from, for the caption.
 
@@ -114,13 +135,14 @@ def draw_learning(
     """
     with style.styled():
         figure, (axes,) = _axes("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
-        for label, (decisions, ages, low, high) in lines.items():
-            (line,) = axes.plot(decisions, ages, label=style.escape_mathtext(label))
-            axes.fill_between(decisions, low, high, color=line.get_color(), alpha=0.2)
+        for label, curve in lines.items():
+            (line,) = axes.plot(curve.decisions, curve.age, label=style.escape_mathtext(label))
+            band = {"color": line.get_color(), "alpha": 0.2}
+            axes.fill_between(curve.decisions, curve.low, curve.high, **band)
         for policy, age in levels.items():
             look = look_of(policy)
             axes.axhline(age, color=look.colour, linestyle=":", label=f"{look.label} {age:.1f}")
-        axes.set(xlabel="team decisions", ylabel=LABELS["aoi"], yscale="log")
+        axes.set(xlabel="team decisions", ylabel=_two_lines(AOI.title, AOI.unit), yscale="log")
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter("")
@@ -131,12 +153,13 @@ def draw_learning(
 
 
 def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:
-    costs = ["aoi", "velocity_variance"] if is_flock(shown[0]) else ["aoi"]
+    """Draw policies below each other, a panel for each cost, from the first at the top."""
+    costs = [AOI, VELOCITY_VARIANCE] if is_flock(shown[0]) else [AOI]
     axes = list(part.subplots(1, len(costs), sharey="row", squeeze=False).flat)
     for each, cost in zip(axes, costs, strict=True):
         for place, result in enumerate(shown):
             _draw_mean(each, place, result, cost)
-        each.set_xlabel(LABELS[cost].replace("\n", " "))
+        each.set_xlabel(cost.label)
         each.grid(visible=False, axis="y")
         each.set_xlim(left=0.0)
     axes[0].set_yticks(range(len(shown)), [_name_of(each) for each in shown])
@@ -161,14 +184,15 @@ def _origin(results: Sequence[Result]) -> str:
 
 
 def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
+    """Draw the mean age and the worst pair's, shaded until everyone has heard of everyone."""
     if "aoi_worst" in columns:
         worst = columns["aoi_worst"]
         axes.plot(columns["window"], worst, color=style.FAINT, linewidth=0.8, label="worst pair")
     axes.plot(columns["window"], columns["aoi"], color=colour, label="mean over all pairs")
-    axes.set_ylabel(LABELS["aoi"])
+    axes.set_ylabel(_two_lines(AOI.title, AOI.unit))
     axes.set_ylim(bottom=0.0)
     complete = np.flatnonzero(columns["is_complete"])
-    first_complete = complete[0] if len(complete) > 0 else -1
+    first_complete = complete[0] if len(complete) > 0 else -1  # -1: never, so up to the end
     end = columns["window"][first_complete]
     if end > columns["window"][0]:
         label = "not everyone has heard of everyone yet"
@@ -176,14 +200,20 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
 
 
-def _draw_mean(axes: Axes, place: int, result: Result, cost: str) -> None:
-    """Draw a policy's mean with its 95 % interval, if there is one."""
-    look, mean = look_of(result.policy), getattr(result, f"{cost}_mean")
-    low = getattr(result, f"{cost}_ci_low")
-    high = getattr(result, f"{cost}_ci_high")
-    if low is not None and high is not None:
-        axes.hlines(place, low, high, color=look.colour, linewidth=3.0, alpha=0.45)
-    axes.plot(mean, place, color=look.colour, marker=look.marker, markersize=look.marker_size + 2.0)
+def _draw_mean(axes: Axes, place: int, result: Result, cost: MissionCost) -> None:
+    """Draw a policy's mean with its 95 % interval, if there is one, at a height on the axes."""
+    look = look_of(result.policy)
+    found = statistics_of(result, cost)
+    if found.ci_low is not None and found.ci_high is not None:
+        ends = found.ci_low, found.ci_high
+        axes.hlines(place, *ends, color=look.colour, linewidth=3.0, alpha=0.45)
+    size = look.marker_size + 2.0  # a lone marker must be found, where a curve's need not
+    axes.plot(found.mean, place, color=look.colour, marker=look.marker, markersize=size)
+
+
+def _two_lines(title: str, unit: str) -> str:
+    """Return a cost's title and unit for a low panel, beside which one line would not fit."""
+    return f"{title}\n[{unit}]"
 
 
 def _axes(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes]]:

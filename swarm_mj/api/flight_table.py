@@ -10,6 +10,7 @@ import numpy as np
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second, where_flown
 from swarm_mj.simulation.rollout import Summary
@@ -25,7 +26,18 @@ FATES = {  # rows of the table: a count among the numbers, and its share of the 
 
 
 def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[str, Any]:
-    """Return the summary of the one mission flown, and its packets; None is what is undefined."""
+    """Return the summary of the one mission flown, and its packets.
+
+    Args:
+        mission: What was flown.
+        policy: Who sent when.
+        summary: What it cost.
+
+    Returns:
+        The fields of `Summary` as plain numbers, then the packet's size [bytes], the team's rate
+        [bytes/s], the share of the first window's velocity variance that is left, and what the
+        policy is; None is what is not defined.
+    """
     numbers: dict[str, Any] = {}
     for name, value in asdict(summary).items():
         numbers[name] = _number(name, value)
@@ -53,10 +65,16 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
 
 
 def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
-    """Return the rows of a flight's table, at most 16, from its `flight_numbers`."""
+    """Return the rows of a flight's table, at most 16.
+
+    Args:
+        mission: What was flown.
+        numbers: Of the flight, as `flight_numbers` returns them.
+        wall_s: How long it took to compute [s].
+    """
     num_windows = numbers["num_windows"]
     rows = {f"windows of {mission.window_s:g} s flown": f"{num_windows} in {wall_s:.2f} s"}
-    rows["age of information, mean"] = _windows(numbers["aoi_mean"], mission, 2)
+    rows[f"{AOI.title}, mean"] = _windows(numbers["aoi_mean"], mission, AOI.digits)
 
     complete = numbers["complete_window"]
     if complete is None:
@@ -93,6 +111,7 @@ def _number(name: str, value: str | int | np.ndarray | None) -> str | int | floa
 
 
 def _windows(value: float | int, mission: Mission, digits: int) -> str:
+    """Return a duration in windows, and in seconds."""
     number = f"{value:.{digits}f}"
     windows = "1 window" if number == "1" else f"{number} windows"
     return f"{windows} ({value * mission.window_s:.2g} s)"
@@ -121,10 +140,11 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     """Return the task's cost; of the paper's moving teams, the velocity variance."""
     name = numbers["task_cost_name"]
     if name not in (None, Flocking.cost_name):
-        return _cost(numbers, "task_cost", name, numbers["task_cost_unit"], 2)
+        return _cost_rows(numbers, TASK_COST, name=name, unit=numbers["task_cost_unit"])
     if not mission.moves:
         return {}
-    rows = _cost(numbers, "velocity_variance", "velocity variance", "m²/s²", 4)
+    cost = VELOCITY_VARIANCE
+    rows = _cost_rows(numbers, cost, name=cost.title, unit=cost.unit)
     left = numbers["velocity_variance_left"]
     if mission.flocks and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
@@ -133,10 +153,14 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
     return rows
 
 
-def _cost(values: Mapping[str, Any], key: str, name: str, unit: str, digits: int) -> dict[str, str]:
-    mean = values[f"{key}_mean"]
-    first = values[f"{key}_first"]
-    last = values[f"{key}_last"]
+def _cost_rows(
+    numbers: Mapping[str, Any], cost: MissionCost, *, name: str, unit: str
+) -> dict[str, str]:
+    """Return a cost's mean over windows, and what it was at the start and the end."""
+    mean = numbers[f"{cost.column}_mean"]
+    first = numbers[f"{cost.column}_first"]
+    last = numbers[f"{cost.column}_last"]
+    digits = cost.digits
     return {
         f"{name}, mean": f"{mean:.{digits}f} {unit}",
         "  first to last window": f"{first:.{digits}f} to {last:.{digits}f} {unit}",

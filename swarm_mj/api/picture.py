@@ -31,6 +31,7 @@ BOTTOM_IN = 0.6
 MARGIN = 1.04  # of the map, around what it must show
 TEXT_IN = 7.75  # where what is written begins
 RAMP_IN = 4.4  # how long the ramp of ages is
+RAMP_ROOM_IN = 0.75  # from the text's last line to the ramp's lower edge, its title between
 # Trails, which fade towards their beginnings.
 TRAIL_WINDOWS = 300
 PIECES = 15  # in which they fade
@@ -76,11 +77,12 @@ def draw_picture(footage: Footage, window: int | None = None) -> Figure:
         shown += _draw_packets(axes, footage, row, radius_m)
         below_in = _write(figure, footage, row)
         _draw_ramp(figure, footage, below_in)
-        _draw_legend(figure, shown, below_in - 0.75)
+        _draw_legend(figure, shown, below_in - RAMP_ROOM_IN)
     return kept(figure)
 
 
 def _row(footage: Footage, window: int | None) -> int:
+    """Return a window's row in the footage, which may have begun later than the mission."""
     windows = footage.window.tolist()
     if window is not None and window not in windows:
         raise ValueError(f"window must be from {windows[0]} to {windows[-1]}, not {window}")
@@ -100,10 +102,12 @@ def _share(
 
 
 def _rgb(colour: palette.Colour) -> str:
+    """Return a colour as matplotlib takes it, such as #ff8000."""
     return f"#{bytes(colour).hex()}"
 
 
 def _size_pt(footage: Footage) -> float:
+    """Return a robot's diameter: the more robots, the smaller, so that few cover others."""
     size = CROWD_PT / np.sqrt(footage.facts.mission.num_robots)
     return float(np.clip(size, SMALLEST_PT, LARGEST_PT))
 
@@ -155,10 +159,13 @@ def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
 
 
 def _draw_trails(axes: Axes, footage: Footage, row: int) -> Line2D:
+    """Draw where the robots came from, fading; return a sample for the legend."""
     trails_m = _trails(footage, row)
     edges = np.linspace(0, len(trails_m) - 1, PIECES + 1).round().astype(int)
     colours = footage.colours[row] / 255.0
+    # A line has one opacity, so a trail that fades is drawn in pieces.
     for k, alpha in enumerate(np.linspace(FAINTEST, BRIGHTEST, PIECES)):
+        # Each piece ends where the next begins, or there would be gaps; [N P 2], a line a robot.
         piece_m = trails_m[edges[k] : edges[k + 1] + 1].swapaxes(0, 1)
         lines = LineCollection(list(piece_m), colors=colours, linewidth=1.6, zorder=2.0)
         lines.set_alpha(alpha)
@@ -170,14 +177,14 @@ def _draw_trails(axes: Axes, footage: Footage, row: int) -> Line2D:
 def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
     """Draw the robots over all but packets; return samples of what the ramp does not show."""
     x, y = footage.position_m[row].T
-    size = _size_pt(footage) ** 2
+    size = _size_pt(footage) ** 2  # matplotlib scatters by area
     off = footage.is_cut_off[row]
     if np.any(off):
         axes.scatter(x[off], y[off], s=3.2 * size, color=_rgb(palette.CUT_OFF), zorder=3.0)
     colours = footage.colours[row] / 255.0
     edge = _rgb(palette.BACKGROUND)
     axes.scatter(x, y, s=size, c=colours, edgecolors=edge, linewidths=0.8, zorder=4.0)
-    own = footage.ego
+    own = footage.ego  # the robot whose knowledge the colours show
     beside_pt = 0.7 * _size_pt(footage)
     axes.annotate(
         f"r{own}",
@@ -235,6 +242,7 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
 def _dot(
     label: str, colour: palette.Colour, marker: str = "o", edge: palette.Colour | None = None
 ) -> Line2D:
+    """Return a marker for the legend."""
     dot = Line2D([], [], linestyle="", marker=marker, markersize=9.0, label=label)
     dot.set(markerfacecolor=_rgb(colour), markeredgecolor=_rgb(edge or colour))
     return dot
@@ -283,8 +291,9 @@ def _write(figure: Figure, footage: Footage, row: int) -> float:
 
 
 def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
+    """Draw what colour stands for what age, below a height on the picture [in]."""
     full = footage.facts.full_scale
-    axes = figure.add_axes(_share(TEXT_IN, below_in - 0.75, RAMP_IN, 0.2))
+    axes = figure.add_axes(_share(TEXT_IN, below_in - RAMP_ROOM_IN, RAMP_IN, 0.2))
     ages = np.linspace(0.0, full, 256)
     axes.imshow(palette.age_colours(ages, full)[None], aspect="auto", extent=(0.0, full, 0.0, 1.0))
     title = f"age of what r{footage.ego} knows of a robot [windows]"
@@ -297,6 +306,7 @@ def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
 
 
 def _draw_legend(figure: Figure, shown: list[Line2D], below_in: float) -> None:
+    """Name what is drawn, by its samples, below a height on the picture [in]."""
     figure.legend(
         handles=shown,
         loc="upper left",

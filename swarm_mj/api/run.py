@@ -9,13 +9,14 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 from rich.table import Table
 
 from swarm_mj.api.flight_summary import FlightSummary, as_lines
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.costs import PACKET_COUNTS
+from swarm_mj.protocol.mission_costs import AOI, MISSION_COSTS
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.components import components_in
@@ -30,19 +31,11 @@ if TYPE_CHECKING:  # each is slow to import, and flights do without
     from matplotlib.figure import Figure
     from pandas import DataFrame
 
-AGE = "age of information: how old a robot's news of another is, over all pairs; less is better"
+AGE = f"{AOI.title}: how old a robot's news of another is, over all pairs; less is better"
 ELSEWHERE = (
     "run.show() plays a video in a notebook. Here, run.save('flight.mp4') writes the video, and "
     "run.save('flight.rrd') a replay that `swarm-mj replay flight.rrd` opens."
 )
-PLACES = {  # of a window's numbers in its record, by their columns
-    "aoi": "costs.age_windows",
-    "velocity_variance": "costs.velocity_variance_m2ps2",
-    "task_cost": "costs.task_cost.value",
-    "hops": "hops",
-    "is_complete": "costs.is_complete",
-    **{f"packets_{name}": f"costs.packets.{name}" for name in PACKET_COUNTS},
-}
 
 
 class Metrics(dict[str, Any]):
@@ -93,7 +86,8 @@ class Run:
 
     def __repr__(self) -> str:
         age = self.summary.aoi_mean
-        cost = f"age of information {age:.2f} windows ({age * self.mission.window_s:.2g} s)"
+        age_s = age * self.mission.window_s
+        cost = f"{AOI.title} {age:.{AOI.digits}f} {AOI.unit} ({age_s:.2g} s)"
         return f"<Run {self.title}: {cost} over {len(self.windows)} windows>"
 
     def _repr_html_(self) -> str:
@@ -137,14 +131,22 @@ class Run:
         """
         window = np.arange(1.0, len(self.windows) + 1.0)
         columns = {"window": window, "seconds": np.round(window * self.mission.window_s, 9)}
-        for name, place in PLACES.items():
-            if name == "task_cost" and self.task_cost is None:
-                continue
-            number_of = attrgetter(place)
-            flown = np.concatenate([number_of(each) for each in self.windows])
-            columns[name] = flown.astype(float)
-            if name == "aoi" and self.log is not None:  # the mean, and beside it the worst
+        for cost in MISSION_COSTS:
+            by_window: list[np.ndarray] = []
+            for each in self.windows:
+                values = cost.of_window(each.costs)
+                if values is not None:
+                    by_window.append(values)
+            if by_window:  # or else the task has no such cost
+                columns[cost.column] = _course(by_window)
+            if cost is AOI and self.log is not None:  # the mean, and beside it the worst
                 columns["aoi_worst"] = self.log.age_max
+        columns["hops"] = _course([each.hops for each in self.windows])
+        columns["is_complete"] = _course([each.costs.is_complete for each in self.windows])
+        packets = [each.costs.packets for each in self.windows]
+        for name in PACKET_COUNTS:
+            count_of = attrgetter(name)
+            columns[f"packets_{name}"] = _course([count_of(each) for each in packets])
         return columns
 
     def to_dataframe(self) -> "DataFrame":
@@ -326,3 +328,8 @@ class Run:
         console = terminal.quiet_console()
         with terminal.WorkBar("Drawing", style.num_frames, "pictures", console=console) as bar:
             return make_video([footage], ending, style, bar.advance)
+
+
+def _course(by_window: Sequence[Shaped[np.ndarray, "B"]]) -> Float[np.ndarray, "T"]:
+    """Return a number of the one mission over its windows, also a truth as 0 or 1."""
+    return np.concatenate(by_window).astype(float)

@@ -1,8 +1,9 @@
 """`swarm-mj curves`: the learning curves of training runs, as a table and as a figure."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -12,11 +13,22 @@ from swarm_mj.learning.run_folder import CURVE, SETTINGS, TrainingRun, read_curv
 from swarm_mj.learning.selection import REFERENCES, Row, column
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
+from swarm_mj.protocol.mission_costs import AOI
 from swarm_mj.system.fields import setting
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
-Learned = tuple[Path, TrainingRun, list[Row]]  # its folder, what was asked for, its evaluations
+if TYPE_CHECKING:  # matplotlib is slow to import
+    from swarm_mj.api.charts import LearningCurve
+
+
+@dataclass(frozen=True, kw_only=True)
+class Learned:
+    """A training run that has been evaluated."""
+
+    folder: Path
+    asked: TrainingRun  # what it was to do
+    rows: list[Row]  # its evaluations, at least one
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,19 +48,15 @@ def run(options: CurvesOptions) -> int:
     """Run the command; return its exit code."""
     check_outputs(Output("--plot", options.plot, ".png|.svg|.pdf"), must_be_new=not options.force)
     runs = [_read(folder) for folder in dict.fromkeys(options.run)]
-    missions, *others = dict.fromkeys(_missions(asked.training) for _, asked, _ in runs)
-    if others:
-        raise ValueError(f"missions differ, {missions} and {others[0]}; draw these runs apart")
-    first, console = runs[0][2][0], plain_console()
-    levels = {name: first[cost] for name in REFERENCES if (cost := column("aoi", name)) in first}
-    wide = max(len(str(name)) for name in (*options.run, *levels))
-    console.print(f"{'run':{wide}}   seed   decisions  best age  last age [windows]")
-    for folder, asked, rows in runs:
-        best, last = min(row["aoi"] for row in rows), rows[-1]
-        numbers = f"{last['decisions']:11,.0f} {best:9.2f} {last['aoi']:9.2f}"
-        console.print(f"{folder!s:{wide}} {asked.training.seed:6} {numbers}")
-    for policy, age in levels.items():
-        console.print(f"{policy:{wide}} {age:38.2f}")
+    missions = _missions(runs[0].asked.training)
+    for each in runs:
+        others = _missions(each.asked.training)
+        if others != missions:
+            raise ValueError(f"missions differ, {missions} and {others}; draw these runs apart")
+    levels = _reference_ages(runs[0].rows[0])
+    console = plain_console()
+    for line in _table(runs, levels):
+        console.print(line)
     if options.plot:
         quiet_matplotlib()
         from swarm_mj.api.charts import draw_learning  # matplotlib is slow to import
@@ -62,9 +70,10 @@ def run(options: CurvesOptions) -> int:
 def _read(folder: Path) -> Learned:
     if not (folder / SETTINGS).is_file():
         raise ValueError(f"{folder} is no run; name a folder that `swarm-mj train` wrote")
-    if not (folder / CURVE).exists() or not (rows := read_curve(folder / CURVE)):
+    rows = read_curve(folder / CURVE) if (folder / CURVE).exists() else []
+    if not rows:
         raise ValueError(f"{folder} has no evaluation yet; wait for one, or train on by --resume")
-    return folder, read_run(folder, named=None), rows
+    return Learned(folder=folder, asked=read_run(folder, named=None), rows=rows)
 
 
 def _missions(training: Training) -> str:
@@ -75,21 +84,60 @@ def _missions(training: Training) -> str:
     return f"{flags} --robots {sizes} --held-out {training.held_out}{own}"
 
 
-def _lines(runs: Sequence[Learned]) -> dict[str, np.ndarray]:
-    """Return a line for the runs that differ only in their seed, as `draw_learning` takes it."""
+def _reference_ages(row: Row) -> dict[str, float]:
+    """Return the ages of the reference policies that a run has flown, by their names [windows]."""
+    ages: dict[str, float] = {}
+    for name in REFERENCES:
+        age = row.get(column(AOI, name))
+        if age is not None:
+            ages[name] = age
+    return ages
+
+
+def _table(runs: Sequence[Learned], levels: Mapping[str, float]) -> Iterator[str]:
+    """Yield a heading, a line for each run, and one for each reference policy."""
+    names = [str(each.folder) for each in runs]
+    width = max(len(name) for name in [*names, *levels])
+    yield f"{'run':{width}}   seed   decisions  best age  last age [{AOI.unit}]"
+    for name, each in zip(names, runs, strict=True):
+        last = each.rows[-1]
+        best_age = min(row["aoi"] for row in each.rows)
+        numbers = f"{last['decisions']:11,.0f} {best_age:9.2f} {last['aoi']:9.2f}"
+        yield f"{name:{width}} {each.asked.training.seed:6} {numbers}"
+    for policy, age in levels.items():
+        yield f"{policy:{width}} {age:38.2f}"
+
+
+def _lines(runs: Sequence[Learned]) -> "dict[str, LearningCurve]":
+    """Return a line, by its label, for the runs that differ only in their seed."""
     groups: dict[tuple[Training, Path | None], list[Learned]] = {}
     for each in runs:
-        alike = replace(each[1].training, seed=0), each[1].init
+        alike = replace(each.asked.training, seed=0), each.asked.init
         groups.setdefault(alike, []).append(each)
-    lines = {}
-    for group in groups.values():
-        folders, asked, rows = zip(*group, strict=True)
-        curves = [{row["decisions"]: row["aoi"] for row in its} for its in rows]
-        shared = sorted(set.intersection(*map(set, curves)))
-        ages = np.array([[curve[x] for x in shared] for curve in curves])
-        label = str(folders[0])
-        if len(group) > 1:
-            num_seeds = len({each.training.seed for each in asked})
-            label += f" to {folders[-1].name}: mean and range of {num_seeds} seeds"
-        lines[label] = np.array([shared, ages.mean(axis=0), ages.min(axis=0), ages.max(axis=0)])
-    return lines
+    return {_label(group): _line(group) for group in groups.values()}
+
+
+def _label(group: Sequence[Learned]) -> str:
+    first = group[0].folder
+    if len(group) == 1:
+        return str(first)
+    num_seeds = len({each.asked.training.seed for each in group})
+    return f"{first} to {group[-1].folder.name}: mean and range of {num_seeds} seeds"
+
+
+def _line(group: Sequence[Learned]) -> "LearningCurve":
+    """Return the ages of runs where all of them have been evaluated."""
+    from swarm_mj.api.charts import LearningCurve  # matplotlib is slow to import
+
+    ages_at = [{row["decisions"]: row["aoi"] for row in each.rows} for each in group]
+    shared = set(ages_at[0])
+    for each in ages_at:
+        shared &= set(each)
+    decisions = sorted(shared)
+    ages = np.array([[each[at] for at in decisions] for each in ages_at])
+    return LearningCurve(
+        decisions=np.array(decisions, dtype=float),
+        age=ages.mean(axis=0),
+        low=ages.min(axis=0),
+        high=ages.max(axis=0),
+    )

@@ -1,17 +1,23 @@
 """`swarm-mj figures`: draws the paper's figures from result files."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from rich.console import Console
+from rich.status import Status as StatusLine
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results import Result, read_results
 from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import GONE_IN, check_choice, setting
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
+
+if TYPE_CHECKING:  # matplotlib is slow to import
+    from swarm_mj.evaluation.figures.style import Figure
 
 FLOCKS = f"the mission flown for {FLOCK}"  # a heading of the help
 
@@ -45,46 +51,71 @@ class FiguresOptions:
 def run(options: FiguresOptions) -> int:
     """Run the command; return its exit code."""
     paths = _paths(options)
-    results = [result for path in options.results for result in read_results(path)]
+    results: list[Result] = []
+    for path in options.results:
+        results += read_results(path)
     console = plain_console()
+    written: list[str] = []
     with Console(stderr=True).status("Drawing ...") as status:
         quiet_matplotlib()
-        from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of  # slow to import
-        from swarm_mj.evaluation.figures.drawing import draw
-        from swarm_mj.evaluation.figures.flock import draw_flock
-        from swarm_mj.evaluation.figures.style import LOOKS, save
+        drawn = _draw(options, results, status)
+        from swarm_mj.evaluation.figures.style import save  # slow to import
 
-        methods = dict.fromkeys([*LOOKS, *(result.policy for result in results)])
-        for method in options.policy:
-            check_choice("policy", method, methods)
-        policy, seed = options.flock_policy, options.flock_seed
-        drawn = {}
-        for name in sorted(paths, key=FLOCK.__eq__):  # it flies, and what is refused comes first
-            status.update(f"Drawing {name} ...")
-            try:
-                if name == FLOCK:
-                    drawn[name] = draw_flock(preset_of(results), policy, seed)
-                else:
-                    drawn[name] = draw(RESULT_FIGURES[name], results, options.policy)
-            except NoPointsError:
-                if options.figure != FIGURES:
-                    raise
-        written = [(drawn[name], path) for name in paths if name in drawn for path in paths[name]]
-        for figure, path in written:  # once all are drawn, so that a failure writes none
-            status.update(f"Writing {path.name} ...")
-            save(figure, path)
-    console.print(f"Wrote {' '.join(str(path) for _, path in written)}")
-    if left_out := ", ".join(name for name in paths if name not in drawn):
-        console.print(f"Left out {left_out}: the results hold no point of them")
+        # Once all are drawn, so that a failure writes none.
+        for name, figure in drawn.items():
+            for path in paths[name]:
+                status.update(f"Writing {path.name} ...")
+                save(figure, path)
+                written.append(str(path))
+    console.print(f"Wrote {' '.join(written)}")
+    left_out = [name for name in paths if name not in drawn]
+    if left_out:
+        console.print(f"Left out {', '.join(left_out)}: the results hold no point of them")
     return 0
+
+
+def _draw(
+    options: FiguresOptions, results: Sequence[Result], status: StatusLine
+) -> "dict[str, Figure]":
+    """Return the figures in the order asked for, but for those that the results have no point of.
+
+    Raises ValueError for a method that is unknown, results that cannot be compared, or if a figure
+    that was asked for by its name has no point.
+    """
+    from swarm_mj.evaluation.figures.curves import NoPointsError, preset_of  # slow to import
+    from swarm_mj.evaluation.figures.drawing import draw
+    from swarm_mj.evaluation.figures.flock import draw_flock
+    from swarm_mj.evaluation.figures.style import LOOKS
+
+    methods = dict.fromkeys([*LOOKS, *(result.policy for result in results)])
+    for method in options.policy:
+        check_choice("policy", method, methods)
+    drawn: dict[str, Figure] = {}
+    # The flock flies a mission, so it comes last: what is refused is told before the wait.
+    for name in sorted(options.figure, key=lambda name: name == FLOCK):
+        status.update(f"Drawing {name} ...")
+        try:
+            if name == FLOCK:
+                preset = preset_of(results)
+                drawn[name] = draw_flock(preset, options.flock_policy, options.flock_seed)
+            else:
+                drawn[name] = draw(RESULT_FIGURES[name], results, options.policy)
+        except NoPointsError:
+            if options.figure != FIGURES:
+                raise
+    return {name: drawn[name] for name in options.figure if name in drawn}
 
 
 def _paths(options: FiguresOptions) -> dict[str, list[Path]]:
     """Return the files of each figure; raise ValueError for those that cannot be written."""
-    endings = dict.fromkeys(options.format)
-    paths = {name: [options.out / f"{name}.{end}" for end in endings] for name in options.figure}
+    paths: dict[str, list[Path]] = {}
+    outputs: list[Output] = []
+    for name in options.figure:
+        paths[name] = [options.out / f"{name}.{end}" for end in dict.fromkeys(options.format)]
+    for its in paths.values():
+        outputs += [Output("figure", path) for path in its]
     check_outputs(
-        *(Output("figure", path) for own in paths.values() for path in own),
+        *outputs,
         inputs=(*options.results, *stored_policies([options.flock_policy])),
         must_be_new=not options.force,
     )

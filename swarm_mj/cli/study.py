@@ -10,6 +10,7 @@ from swarm_mj.cli.mission_options import missions_of
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import check_kind, check_names, did_you_mean, former_names, setting
@@ -18,6 +19,8 @@ from swarm_mj.system.reading import read_file
 from swarm_mj.system.terminal import plain_console
 
 MAX_BYTES = 1_000_000
+# A flock's velocity variance is its task's cost; that of other tasks, no policy can change.
+COMPARED = (AOI, TASK_COST)
 TAKES = {"run": "FILE.toml", "compare": "BEFORE.parquet AFTER.parquet"}
 
 
@@ -54,17 +57,27 @@ def run(options: StudyOptions) -> int:
     need("scipy", "a comparison")
     from swarm_mj.evaluation.missions_table import compared, read_missions  # pandas is slow
 
-    before, after = (read_missions(Path(name)) for name in named)
-    for cost in ("aoi", "task_cost"):
+    before = read_missions(Path(named[0]))
+    after = read_missions(Path(named[1]))
+    for cost in COMPARED:
         rows = compared(before, after, cost)
         if len(rows):  # tasks without a cost have none
             table = rows.to_string(index=False, na_rep="-", float_format="{:.3g}".format)
-            plain_console().print(f"{cost}, means over missions, with 95 % intervals\n{table}\n")
+            title = f"{cost.column}, means over missions, with 95 % intervals"
+            plain_console().print(f"{title}\n{table}\n")
     return DONE
 
 
 def read_study(name: str) -> Study:
-    """Return the study of a TOML file, or a shipped one by its name; ValueError for a bad one."""
+    """Return the study of a TOML file, or a shipped one.
+
+    Args:
+        name: The file's path, or the name of a shipped study.
+
+    Raises:
+        ValueError: There is no such study, or the file is none.
+        OSError: The file cannot be read.
+    """
     shipped = {each.stem: each for each in asset("studies").glob("*.toml")}
     path = shipped.get(name, Path(name))
     if path.suffix != ".toml":
@@ -78,6 +91,7 @@ def read_study(name: str) -> Study:
 
 
 def _study(tables: dict[str, Any]) -> Study:
+    """Return a study from a file's tables; without [missions.NAME], [mission] has its missions."""
     check_names("a study", tables, ("study", "mission", "missions"))
     own = _values("[study]", tables.get("study", {}), Study)
     own["policies"] = tuple(registry.listed(own.get("policies", DEFAULT_POLICIES)))

@@ -8,6 +8,7 @@ from rich.console import Console
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import ORACLE, REFERENCES, Choice, Cost, Progress, Row, Status
+from swarm_mj.protocol.mission_costs import AOI, MissionCost
 from swarm_mj.system.terminal import WorkBar
 
 FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
@@ -23,7 +24,9 @@ class Watch(WorkBar):
     ) -> None:
         """Prepare the bar; `is_interrupted` says whether Ctrl-C was pressed."""
         super().__init__("Training", 1.0, console=console)
-        self._console, self._run, self._is_interrupted = console, run, is_interrupted
+        self._console = console
+        self._run = run
+        self._is_interrupted = is_interrupted
         self._num_rows = 0  # of the curve that were shown, in this session or before
         self.has_begun = False  # whether there was anything to do
         self.has_stopped = False  # whether the run was asked to stop
@@ -33,8 +36,10 @@ class Watch(WorkBar):
         progress = status.progress
         if self.has_begun and len(progress.curve) > self._num_rows:
             self._console.print(_row(self._run, progress))
-        self.has_begun, self._num_rows = True, len(progress.curve)
-        self.what, self.text = status.what, _text(status)
+        self.has_begun = True
+        self._num_rows = len(progress.curve)
+        self.what = status.what
+        self.text = _text(status)
         self.move_to(share_done(progress, self._run.limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
@@ -50,17 +55,22 @@ class Watch(WorkBar):
 
 def share_done(progress: Progress, limits: Limits) -> float:
     """Return the share of a run that is done, by the limit that it is nearest to."""
-    pairs = ((progress.decisions, limits.decisions), (progress.minutes, limits.minutes))
-    return min(1.0, max((done / limit for done, limit in pairs if limit), default=0.0))
+    share = 0.0
+    if limits.decisions:
+        share = progress.decisions / limits.decisions
+    if limits.minutes:
+        share = max(share, progress.minutes / limits.minutes)
+    return min(1.0, share)
 
 
 def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     """Return rows for the closing table: the policy kept, and others on the same missions."""
     if progress.best is None:
         return {}
-    training, is_chosen = run.training, progress.choice is not None
+    training = run.training
+    is_chosen = progress.choice is not None
     choice = progress.choice or _best_so_far(run, progress, progress.best)
-    cost = training.reward if is_chosen else "aoi"  # evaluations tell the error of the age alone
+    cost = training.cost if is_chosen else AOI  # evaluations tell the error of the age alone
     use = "not used to select the policy" if is_chosen else "which selected the policy"
     rows = {
         "missions": f"{choice.num_missions} of each team size, {use}",
@@ -70,9 +80,10 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
         rows[NAMES.get(name, name)] = _amount(each, cost) + known
     # The oracle flies few missions, those of evaluations only.
-    if (age := _reference_ages(progress.curve[0]).get(ORACLE)) is not None:
+    age = _reference_ages(progress.curve[0]).get(ORACLE)
+    if age is not None:
         missions = f"on {_oracle_missions(run)} of the evaluations"
-        rows[ORACLE] = f"{_amount(age, 'aoi')}, {missions}; {REFERENCES[ORACLE]}"
+        rows[ORACLE] = f"{_amount(age, AOI)}, {missions}; {REFERENCES[ORACLE]}"
     elif max(training.robots) > selection.ORACLE_ROBOTS:
         too_many = f"more than {selection.ORACLE_ROBOTS} robots"
         rows[ORACLE] = f"not flown: it would take long with {too_many}"
@@ -113,7 +124,7 @@ def _comparison(run: TrainingRun, other: str, cost: Cost) -> Iterator[str]:
     """Yield a sentence about another policy, unless the policy kept clearly beats it."""
     error = cost.behind_sem
     is_clear = error is not None and abs(cost.behind) > CLEAR * error
-    by = _amount(Cost(mean=abs(cost.behind), sem=error), run.training.reward)
+    by = _amount(Cost(mean=abs(cost.behind), sem=error), run.training.cost)
     if cost.behind > 0.0:
         weaker = f"is no better than {other}, which is ahead by {by}"
         place = f"loses to {other} by {by}" if is_clear else weaker
@@ -138,7 +149,7 @@ def _row(run: TrainingRun, progress: Progress) -> str:
     ages = _reference_ages(row).items()
     others = "".join(f"  {name} {age.mean:.2f}{flown.get(name, '')}" for name, age in ages)
     when = f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min"
-    age = _amount(_age(row), "aoi").removesuffix(" windows")
+    age = _amount(_age(row), AOI).removesuffix(f" {AOI.unit}")
     return f"{when}   held-out age {age}{note:13}{others}"
 
 
@@ -160,8 +171,12 @@ def _age(row: Row) -> Cost:
 
 def _reference_ages(row: Row) -> dict[str, Cost]:
     """Return the ages of reference policies that were flown on the same missions [windows]."""
-    ages = {name: row.get(selection.column("aoi", name)) for name in REFERENCES}
-    return {name: Cost(mean=age, sem=None) for name, age in ages.items() if age is not None}
+    ages: dict[str, Cost] = {}
+    for name in REFERENCES:
+        age = row.get(selection.column(AOI, name))
+        if age is not None:
+            ages[name] = Cost(mean=age, sem=None)
+    return ages
 
 
 def _oracle_missions(run: TrainingRun) -> str:
@@ -171,8 +186,8 @@ def _oracle_missions(run: TrainingRun) -> str:
     return f"{number} of {held_out} missions"
 
 
-def _amount(cost: Cost, kind: str) -> str:
-    """Return a cost with its standard error, in the unit of its kind."""
-    unit, digits = ("windows", 2) if kind == "aoi" else ("m²/s²", 4)
+def _amount(cost: Cost, kind: MissionCost) -> str:
+    """Return how much of a kind of cost it was, with its standard error and its unit."""
+    digits = kind.digits
     spread = "" if cost.sem is None else f" ± {cost.sem:.{digits}f}"
-    return f"{cost.mean:.{digits}f}{spread} {unit}"
+    return f"{cost.mean:.{digits}f}{spread} {kind.unit}"

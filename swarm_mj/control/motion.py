@@ -19,6 +19,7 @@ from swarm_mj.mission.batched_rng import Stream, normal
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.costs import velocity_variance
+from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
 from swarm_mj.system.compiled import compiled
 
 
@@ -105,8 +106,8 @@ class RandomWalk:
 class Flocking:
     """Velocity consensus by `flocking` (IV-A)."""
 
-    cost_name = "velocity variance"
-    cost_unit = "m²/s²"
+    cost_name = VELOCITY_VARIANCE.title
+    cost_unit = VELOCITY_VARIANCE.unit
 
     def __init__(self, mission: Mission) -> None:
         self._flocking_set: FlockingSet = mission.flocking_set

@@ -21,7 +21,7 @@ from swarm_mj.protocol.costs import (
     no_packets,
     velocity_variance,
 )
-from swarm_mj.protocol.mission_costs import AOI, MISSION_COSTS, TASK_COST, VELOCITY_VARIANCE
+from swarm_mj.protocol.mission_costs import AOI, BY_REWARD, TASK_COST, VELOCITY_VARIANCE
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
 
@@ -29,9 +29,7 @@ Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
 
 # A team's reward is minus a cost. "credit" is each robot's own.
-COSTS = {cost.reward: cost for cost in MISSION_COSTS}
-REWARDS = (*COSTS, "credit")
-PACKETS = ("sent", "delivered", "lost", "overheard", "answered")  # counts, in infos
+REWARDS = (*BY_REWARD, "credit")
 # Training and environments draw seeds from here on, so small ones are left for evaluations.
 FIRST_TRAINING_SEED, LAST_TRAINING_SEED = 2**40, 2**62
 
@@ -101,8 +99,9 @@ class MissionBatch:
                 nothing has moved.
         """
         if self.reward != "credit":
-            self.fly(recipient)
-            cost = self.infos()[COSTS[self.reward].info]
+            cost = BY_REWARD[self.reward].of_window(self.fly(recipient))
+            if cost is None:
+                raise ValueError(f"reward {self.reward} needs a task that has a cost")
             return np.broadcast_to(-cost[:, None], recipient.shape)
         swarm = self.flown
         # The credit replays this window, so it needs T and the channel's draws from before it.
@@ -192,9 +191,12 @@ class MissionBatch:
             AOI.info: costs.age_windows,
             VELOCITY_VARIANCE.info: costs.velocity_variance_m2ps2,
             "is_complete": costs.is_complete,
+            "packets_sent": packets.sent,
+            "packets_delivered": packets.delivered,
+            "packets_lost": packets.lost,
+            "packets_overheard": packets.overheard,
+            "packets_answered": packets.answered,
         }
-        for name in PACKETS:
-            infos[f"packets_{name}"] = getattr(packets, name)
         if costs.task_cost is not None:
             infos[TASK_COST.info] = costs.task_cost.value
         return infos

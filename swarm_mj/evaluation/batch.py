@@ -12,6 +12,7 @@ from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of
@@ -54,6 +55,16 @@ class BatchCosts:
     # Over all missions: how often a robot's knowledge of another had each age, in slots, from 0 to
     # the mission's length.
     ages: Int[np.ndarray, "bins"]
+
+    def of(self, cost: MissionCost) -> Float[np.ndarray, "B"]:
+        """Return one of `MISSION_COSTS`, of each mission; raise ValueError for any other cost."""
+        if cost is AOI:
+            return self.aoi
+        if cost is VELOCITY_VARIANCE:
+            return self.velocity_variance
+        if cost is TASK_COST:
+            return self.task_cost
+        raise ValueError(f"missions have no cost {cost.column}")
 
 
 @one_line_each()  # what is raised loses its places on the way between processes

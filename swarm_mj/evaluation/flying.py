@@ -39,19 +39,29 @@ def fly_study(
     keep: Callable[[int, BatchCosts], None] | None,
     console: Console,
 ) -> None:
-    """Fly the batches that `costs` lacks, into `costs` and where they are kept; a bar shows it.
+    """Fly the batches that `costs` lacks, while a bar shows how far it is.
 
-    Raises KeyboardInterrupt by Ctrl-C; `costs` then has all batches that were flown.
+    Args:
+        study: What is to be flown.
+        costs: What has been flown, by the batches' indices in `study.batches`; others are added.
+        engine: What flies the batches, here or on other machines.
+        keep: Stores a batch's costs, by its index; None if they need not outlive the process.
+        console: Where the bar is drawn.
+
+    Raises:
+        KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
     """
     left = [index for index in range(len(study.batches)) if index not in costs]
     # With nothing left, no cluster is started.
     starts = engine if left else Local()
+    # Batches come back in any order, each with its place in what the engine was given.
     flown = starts.run(fly_batch, [study.batches[index] for index in left])
     done = num_flown(study, costs)
     bar = WorkBar("Flying", study.num_missions, "missions", completed=done, console=console)
     with bar, closing(flown):
         for which, batch_costs in flown:
             index = left[which]
+            # Ctrl-C between the two would leave a batch in `costs` that no file has.
             with deferred_interrupt() as is_interrupted:
                 costs[index] = batch_costs
                 if keep:
@@ -79,11 +89,22 @@ def append_progress(path: Path, header: dict[str, Any], index: int, costs: Batch
 
 
 def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
-    """Return what an interrupted evaluation with this header has flown, by the batches' indices.
+    """Return what an interrupted evaluation has flown.
 
-    A line that was cut off is dropped from the file; it is begun anew if not even its header, what
-    the batches depend on, was written. Raises ValueError if the batches depended on something else,
-    or the file is damaged or none of this kind; OSError if it cannot be read or written.
+    A line that was cut off is dropped from the file; it is begun anew if not even its header was
+    written.
+
+    Args:
+        path: The progress file.
+        header: What the batches depend on now, as `Study.header` returns it.
+
+    Returns:
+        The batches' costs by their indices.
+
+    Raises:
+        ValueError: The batches depended on something else, or the file is damaged or none of this
+            kind.
+        OSError: The file cannot be read or written.
     """
     content = read_file(path, "progress", MAX_BYTES)
     whole, _, cut_off = content.rpartition(b"\n")
@@ -138,6 +159,10 @@ def _digest(text: bytes) -> bytes:
 
 
 def _differences(name: str, before: object, now: object) -> Iterator[str]:
+    """Yield a sentence for each difference between two headers, or parts of them, as JSON has them.
+
+    Keys come in the order of the later header, so that the first sentence is of what matters most.
+    """
     if isinstance(before, dict) and isinstance(now, dict):
         for key in dict.fromkeys([*now, *before]):
             yield from _differences(key, before.get(key), now.get(key))

@@ -15,7 +15,7 @@ from pyarrow import parquet
 from swarm_mj.evaluation.results import Evaluated, config_of
 from swarm_mj.evaluation.samples import bootstrap_interval
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.mission_costs import MISSION_COSTS
+from swarm_mj.protocol.mission_costs import MISSION_COSTS, MissionCost
 from swarm_mj.simulation.components import CALLED_WITH
 from swarm_mj.system.fields import kind_of
 from swarm_mj.system.reading import open_file
@@ -23,16 +23,30 @@ from swarm_mj.system.writing import write_bytes
 
 KINDS = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 REGIME = {spec.name: kind_of(spec) for spec in fields(Mission)} | dict.fromkeys(CALLED_WITH, str)
-STUDY = ("version", "commit", "episodes", "seed", "baseline")  # with all policies and regimes
 COSTS = [cost.column for cost in MISSION_COSTS]
 COLUMNS = {"policy": str, "seed": int} | dict.fromkeys(COSTS, float) | REGIME
 
 
 def write_missions(path: Path, evaluated: Sequence[Evaluated]) -> None:
-    """Write a row for each mission, and into the metadata the study, as JSON."""
+    """Write a row for each mission, and into the metadata the study, as JSON.
+
+    Args:
+        path: The Parquet file, which is replaced if it exists.
+        evaluated: The results of one study, at least one.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     columns = [(name, KINDS[kind]) for name, kind in COLUMNS.items()]
-    study: dict[str, Any] = {name: getattr(evaluated[0].result, name) for name in STUDY}
-    study["policies and regimes"] = [config_of(each.result) for each in evaluated]
+    first = evaluated[0].result
+    study = {  # what all results of a study share, and what tells them apart
+        "version": first.version,
+        "commit": first.commit,
+        "episodes": first.episodes,
+        "seed": first.seed,
+        "baseline": first.baseline,
+        "policies and regimes": [config_of(each.result) for each in evaluated],
+    }
     rows: list[dict[str, Any]] = []
     for each in evaluated:
         regime = config_of(each.result) | {"policy": each.result.policy}
@@ -48,7 +62,11 @@ def write_missions(path: Path, evaluated: Sequence[Evaluated]) -> None:
 
 
 def read_missions(path: Path) -> pd.DataFrame:
-    """Return the rows of such a file; raise ValueError if it is none."""
+    """Return the missions of a file that `write_missions` wrote, one a row.
+
+    Raises:
+        ValueError: The file is none of these, or cannot be read.
+    """
     with open_file(path, "missions") as file:
         try:
             found = pd.read_parquet(file)
@@ -58,13 +76,24 @@ def read_missions(path: Path) -> pd.DataFrame:
     return found.assign(**newer)  # in a file without a field, it had its default
 
 
-def compared(before: pd.DataFrame, after: pd.DataFrame, cost: str) -> pd.DataFrame:
+def compared(before: pd.DataFrame, after: pd.DataFrame, cost: MissionCost) -> pd.DataFrame:
     """Return how a cost differs, mission by mission: a row for each policy in each regime.
 
-    Means and the interval of 95 % are over the missions that both have, if there are any.
+    Args:
+        before: Missions, as `read_missions` returns them.
+        after: The same, or others.
+        cost: Which of their costs.
+
+    Returns:
+        Means before and after, their difference with its interval of 95 %, in the cost's unit, over
+        the missions that both have, if there are any, and how many only one has. Without rows if
+        no task has such a cost.
     """
+    # As pandas names columns that both tables have.
+    of_before = f"{cost.column}_x"
+    of_after = f"{cost.column}_y"
     both = before.merge(after, "outer", ["policy", *REGIME, "seed"], indicator=True)
-    both = both.dropna(subset=[f"{cost}_x", f"{cost}_y"], how="all")
+    both = both.dropna(subset=[of_before, of_after], how="all")
     varied = ["policy"]
     for name in REGIME:  # those that tell regimes apart
         if len(both[[*varied, name]].drop_duplicates()) > len(both[varied].drop_duplicates()):
@@ -74,8 +103,8 @@ def compared(before: pd.DataFrame, after: pd.DataFrame, cost: str) -> pd.DataFra
         found = np.array(missions["_merge"])
         is_in_both = found == "both"
         shown = missions[is_in_both] if is_in_both.any() else missions
-        old = np.array(shown[f"{cost}_x"], float)
-        new = np.array(shown[f"{cost}_y"], float)
+        old = np.array(shown[of_before], float)
+        new = np.array(shown[of_after], float)
         difference = new - old
         ends = bootstrap_interval(difference[~np.isnan(difference)])
         row = {name: missions[name].iloc[0] for name in varied}

@@ -19,13 +19,13 @@ from typing import Literal, NamedTuple, TypeAlias
 import msgspec
 
 from swarm_mj.mission import PAPERS, Mission, Task
+from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.system.reading import read_rows
 
 BASELINES = ("random-flooding", "round-robin", "mst")  # the paper's three
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
 FORMATS = ("svg", "png", "pdf")
 Scale: TypeAlias = Literal["linear", "log"]
-Cost: TypeAlias = Literal["aoi", "velocity_variance"]  # as results and published points name it
 MissionField: TypeAlias = Literal["num_robots", "range_ratio", "velocity_ratio"]
 # The fields that figures sweep, by the command line's options.
 OPTIONS: dict[MissionField, str] = {
@@ -43,8 +43,8 @@ class Point:
     method: str  # one of `BASELINES`, or a learned one as the figure names it
     x_name: str  # receptive_field, range_ratio, num_robots or velocity_ratio
     x: float
-    cost: Cost  # aoi [windows] or velocity_variance [m²/s²]
-    mean: float
+    cost: str  # the column of one of `MISSION_COSTS`
+    mean: float  # in the cost's unit
     std: float  # over the missions
     episodes: int
 
@@ -65,8 +65,7 @@ def points() -> tuple[Point, ...]:
 class Panel(NamedTuple):
     """One pair of axes: a cost over the figure's x."""
 
-    cost: Cost
-    label: str  # with the cost's unit
+    cost: MissionCost
     scale: Scale = "log"
 
 
@@ -129,7 +128,7 @@ RECEPTIVE_FIELD = ResultFigure(
     x_name="receptive_field",
     x_label="receptive field of the GNN [hops]",
     irrelevant=("velocity_ratio",),
-    panels=(Panel(cost="aoi", label="age of information [windows]", scale="linear"),),
+    panels=(Panel(cost=AOI, scale="linear"),),
 )
 """Stationary teams whose GNN looks one to several hops far (Fig. 3)."""
 
@@ -141,7 +140,7 @@ TRANSMIT_POWER = ResultFigure(
     x_label="range ratio: how far a packet reaches in silence [km]",
     x_scale="log",
     irrelevant=("velocity_ratio",),
-    panels=(Panel(cost="aoi", label="age of information [windows]"),),
+    panels=(Panel(cost=AOI),),
 )
 """Stationary teams whose packets reach less or more far (Fig. 4)."""
 
@@ -151,7 +150,7 @@ TEAM_SIZE = ResultFigure(
     task="random-walk",
     x_name="num_robots",
     x_label="team size [robots]",
-    panels=(Panel(cost="aoi", label="age of information [windows]"),),
+    panels=(Panel(cost=AOI),),
 )
 """Random walks of teams that are smaller or larger (Fig. 5)."""
 
@@ -162,13 +161,12 @@ FLOCKING = ResultFigure(
     x_name="velocity_ratio",
     x_label="velocity ratio: how far a robot gets along an axis [km in 50 s]",
     panels=(
-        Panel(cost="aoi", label="age of information [windows]"),
-        Panel(cost="velocity_variance", label="velocity variance [m²/s²]"),
+        Panel(cost=AOI),
+        Panel(cost=VELOCITY_VARIANCE),
     ),
 )
 """Flocks that are slower or faster (Fig. 6)."""
 
-AOI, VARIANCE = FLOCKING.panels
 _ALL = (RECEPTIVE_FIELD, TRANSMIT_POWER, TEAM_SIZE, FLOCKING)
 RESULT_FIGURES = {figure.name: figure for figure in _ALL}
 FIGURES = (FLOCK, *RESULT_FIGURES)
@@ -177,7 +175,15 @@ SWEEPS = {figure.task: figure for figure in _ALL if figure.sweeps_missions}
 
 
 def published(policy: str, mission: Mission) -> dict[str, Point]:
-    """Return what the paper reports for a policy, by cost, if only x differs from its preset."""
+    """Return what the paper reports for a policy, if only x differs from a preset of the paper's.
+
+    Args:
+        policy: Its name.
+        mission: The missions, all with these numbers.
+
+    Returns:
+        The published points, by the columns of their costs; none for other policies or missions.
+    """
     if policy not in BASELINES or mission.task not in SWEEPS or mission.preset not in PAPERS:
         return {}
     sweep = SWEEPS[mission.task]

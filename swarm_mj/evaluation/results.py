@@ -1,13 +1,13 @@
-"""Results of evaluations: their columns, what tables show of them, and files of them.
+"""Results of evaluations: their columns, and files of them.
 
-A new column is a field of `Result`, and an entry of `WIDE` or `BRIEF` if tables should show it.
+A new column is a field of `Result`; `table_columns` says which of them are printed.
 """
 
 import math
 from collections.abc import Callable, Iterable
 from dataclasses import Field, asdict, dataclass, fields
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import msgspec
 import numpy as np
@@ -15,13 +15,12 @@ import numpy as np
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_column
 from swarm_mj.mission.specification import NOTHING, OPEN, Mission
-from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.radio.words import radio_in_words
 from swarm_mj.system.fields import former_names
 from swarm_mj.system.reading import read_json, read_rows
 from swarm_mj.system.writing import write_csv
 
-NONE = "-"  # a cell of what does not exist
 CARRIES_MORE = "carry more than T, M, P"  # said wherever such policies are shown
 MAX_BYTES = 100_000_000  # of a file
 
@@ -204,7 +203,7 @@ class Evaluated:
 
     @property
     def costs(self) -> dict[str, list[float]]:
-        """Each mission's costs by their names, `MISSION_COSTS`; those that the task has."""
+        """Each mission's costs, by their columns; those that the task has."""
         costs = {AOI.column: self.aoi, VELOCITY_VARIANCE.column: self.velocity_variance}
         if self.task_cost is not None:
             costs[TASK_COST.column] = self.task_cost
@@ -217,9 +216,54 @@ class Evaluated:
         return asdict(self.result) | missions
 
 
+class CostStatistics(NamedTuple):
+    """A cost of one policy over all missions, in the cost's unit."""
+
+    mean: float  # nan if the task has no such cost
+    sem: float | None  # the mean's standard error
+    ci_low: float | None  # the mean's interval of 95 %
+    ci_high: float | None
+
+
+def statistics_of(result: Result, cost: MissionCost) -> CostStatistics:
+    """Return what a result says of a cost of `MISSION_COSTS`; None is what does not exist.
+
+    Args:
+        result: One row of results.
+        cost: Which of its costs.
+
+    Raises:
+        ValueError: Results have no such cost.
+    """
+    if cost is AOI:
+        return CostStatistics(
+            mean=result.aoi_mean,
+            sem=result.aoi_sem,
+            ci_low=result.aoi_ci_low,
+            ci_high=result.aoi_ci_high,
+        )
+    if cost is VELOCITY_VARIANCE:
+        return CostStatistics(
+            mean=result.velocity_variance_mean,
+            sem=result.velocity_variance_sem,
+            ci_low=result.velocity_variance_ci_low,
+            ci_high=result.velocity_variance_ci_high,
+        )
+    if cost is TASK_COST:
+        mean = math.nan if result.task_cost_mean is None else result.task_cost_mean
+        # Files hold no interval of a task's cost.
+        return CostStatistics(mean=mean, sem=result.task_cost_sem, ci_low=None, ci_high=None)
+    raise ValueError(f"results have no cost {cost.column}")
+
+
 def carries_more(result: Result) -> bool:
     """Return whether packets carry more than T, M and P (II-B); older files do not say."""
     return result.payload not in (None, "none")
+
+
+def is_flock(result: Result) -> bool:
+    """Return whether the robots were to agree on one velocity."""
+    return result.task == "flocking"
 
 
 def has_own_cost(result: Result) -> bool:
@@ -245,209 +289,6 @@ def config_of(result: Result) -> dict[str, Any]:
         raise ValueError(
             f"config of {result.policy} must be a JSON object, not {result.config!r:.60}"
         ) from error
-
-
-# What tables show.
-
-Text = str | Callable[[Result], str]  # the same of every result, or not
-
-
-@dataclass(frozen=True, kw_only=True)
-class Shown:
-    """A column of printed tables. Headings and cells have up to two lines.
-
-    `meaning` is a sentence below the tables, or more of them; empty where none is needed. It is of
-    the first result if every table has the column. If `applies` tells which do, it may differ from
-    result to result, and comes after the others.
-    """
-
-    heading: Text
-    cell: Callable[[Result], str]
-    meaning: Text
-    applies: Callable[[Result], bool] | None = None  # None: to every result
-
-
-def said(text: Text, result: Result) -> str:
-    """Return a text, as it is of a result."""
-    return text if isinstance(text, str) else text(result)
-
-
-def number(value: float | None, form: str = ".2f") -> str:
-    """Return a cell's number."""
-    return NONE if value is None else format(value, form)
-
-
-def plus_minus(mean: float | None, sem: float | None) -> str:
-    """Return a mean and its standard error, if there is one."""
-    return number(mean) if sem is None else f"{number(mean)} ± {sem:.2f}"
-
-
-def interval(low: float | None, high: float | None) -> str:
-    """Return both ends, or nothing where there is no interval."""
-    return "" if low is None or high is None else f"{low:.2f}, {high:.2f}"
-
-
-def _reached(result: Result) -> str:
-    """Return the share of requests that reached their addressee, of broadcasts anybody."""
-    reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
-    return number(reached, ".0%")
-
-
-def _difference(result: Result) -> str:
-    ends = interval(result.aoi_difference_ci_low, result.aoi_difference_ci_high)
-    return f"{number(result.aoi_difference_mean)}\n{ends}"
-
-
-def _difference_in_a_line(result: Result) -> str:
-    ends = interval(result.aoi_difference_ci_low, result.aoi_difference_ci_high)
-    mean = number(result.aoi_difference_mean)
-    return f"{mean} [{ends}]" if ends else mean
-
-
-def _task_cost(result: Result) -> str:
-    return plus_minus(result.task_cost_mean, result.task_cost_sem)
-
-
-def _task_cost_at_the_end(result: Result) -> str:
-    return plus_minus(result.task_cost_last_mean, result.task_cost_last_sem)
-
-
-def _task_cost_difference(result: Result) -> str:
-    ends = interval(result.task_cost_difference_ci_low, result.task_cost_difference_ci_high)
-    return f"{number(result.task_cost_difference_mean)}\n{ends}"
-
-
-def _task_cost_meaning(result: Result) -> str:
-    if not has_own_cost(result):
-        return ""
-    cost = f"{result.task_cost_name} [{result.task_cost_unit}]"
-    return f"Task cost: {cost}, mean over windows ± standard error over missions."
-
-
-def is_flock(result: Result) -> bool:
-    """Return whether the robots were to agree on one velocity."""
-    return result.task == "flocking"
-
-
-def _shows_variance(result: Result) -> bool:
-    return is_flock(result) and not has_own_cost(result)
-
-
-def _variance_meaning(result: Result) -> str:
-    if not is_flock(result):
-        return ""
-    return "Velocity variance (var.): of the robots' velocities [m²/s²]."
-
-
-def _published(result: Result) -> str:
-    age = plus_minus(result.published_aoi_mean, result.published_aoi_sem)
-    variance = result.published_velocity_variance_mean
-    if variance is None or not is_flock(result):
-        return age
-    return f"{age}\n{variance:.4f}"
-
-
-def _published_meaning(result: Result) -> str:
-    return "" if result.published_aoi_mean is None else "Published: by the paper."
-
-
-AGE_MEANING = (
-    "AoI: age of information, how old a robot's news of another is [windows]; mean over the "
-    "missions,"
-)
-
-# What most people read, in one line.
-BRIEF = (
-    Shown(
-        heading="AoI ± SEM",
-        cell=lambda result: plus_minus(result.aoi_mean, result.aoi_sem),
-        meaning=f"{AGE_MEANING} with its standard error.",
-    ),
-    Shown(
-        heading=lambda result: f"minus {result.baseline}'s [95 %]",
-        cell=_difference_in_a_line,
-        meaning="Differences are mission by mission, with 95 % intervals.",
-    ),
-    Shown(
-        heading="task cost ± SEM",
-        cell=_task_cost,
-        meaning=_task_cost_meaning,
-        applies=has_own_cost,
-    ),
-    Shown(
-        heading="heard",
-        cell=_reached,
-        meaning=(
-            "Heard: packets that reached their addressee or, of broadcasts, at least one robot."
-        ),
-    ),
-)
-
-# What `--wide` shows.
-WIDE = (
-    Shown(
-        heading="AoI ± SEM\n95 %",
-        cell=lambda result: (
-            f"{plus_minus(result.aoi_mean, result.aoi_sem)}\n"
-            f"{interval(result.aoi_ci_low, result.aoi_ci_high)}"
-        ),
-        meaning=f"{AGE_MEANING} standard error and 95 % interval.",
-    ),
-    Shown(
-        heading="median\np95",
-        cell=lambda result: f"{result.aoi_median:.2f}\n{result.aoi_p95:.2f}",
-        meaning="Median and p95 are over missions.",
-    ),
-    Shown(
-        heading="difference\n95 %",
-        cell=_difference,
-        meaning=lambda result: (
-            f"Difference: AoI minus that of {result.baseline}, mission by mission."
-        ),
-    ),
-    Shown(
-        heading="packets\nreached",
-        cell=lambda result: f"{result.packets_per_window:.2f}\n{_reached(result)}",
-        meaning=(
-            "Packets: sent in a window, and the share that reached its addressee or, of "
-            "broadcasts, at least one robot;"
-        ),
-    ),
-    Shown(
-        heading="hearers\nbytes",
-        cell=lambda result: (
-            f"{number(result.hearers_per_packet)}\n{number(result.packet_bytes, ',d')}"
-        ),
-        meaning=("hearers: robots that decoded a broadcast, on average. Bytes: of a packet."),
-    ),
-    Shown(
-        heading="task cost\nat the end",
-        cell=lambda result: f"{_task_cost(result)}\n{_task_cost_at_the_end(result)}",
-        meaning=_task_cost_meaning,
-        applies=has_own_cost,
-    ),
-    Shown(
-        heading="difference\nof task cost",
-        cell=_task_cost_difference,
-        meaning="",
-        applies=has_own_cost,
-    ),
-    Shown(
-        heading="velocity\nvariance",
-        cell=lambda result: f"{result.velocity_variance_mean:.4f}",
-        meaning=_variance_meaning,
-        applies=_shows_variance,
-    ),
-    Shown(
-        heading=lambda result: "published\nAoI, var." if is_flock(result) else "published\nAoI",
-        cell=_published,
-        meaning=_published_meaning,
-        applies=lambda result: not has_own_cost(result),
-    ),
-)
-
-
-# Files.
 
 
 def read_results(path: Path) -> list[Result]:

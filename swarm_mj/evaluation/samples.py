@@ -74,8 +74,11 @@ def standard_error(samples: Float[np.ndarray, "n"]) -> float | None:
 def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
     """Return the mean's bias-corrected and accelerated bootstrap interval, 95 % (Efron 1987).
 
-    The samples are independent; paired differences are one sample a pair. Both ends are None where
-    the samples do not vary, or there is only one.
+    Args:
+        samples: Independent ones, [n]; paired differences are one sample a pair.
+
+    Returns:
+        Both ends, in the samples' unit; None where the samples do not vary, or there is only one.
     """
     largest = float(np.max(np.abs(samples), initial=0.0))
     if samples.size < 2 or float(np.ptp(samples)) <= ROUNDING * largest:
@@ -88,5 +91,10 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
 
 
 def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:
-    """Return the first bin at or below which at least this share of all counts lies."""
+    """Return the first bin at or below which at least this share of all counts lies.
+
+    Args:
+        counts: How often each bin was met, [bins], from 0 on.
+        share: From 0 to 1; 0.5 gives the median's bin.
+    """
     return int(np.searchsorted(np.cumsum(counts), share * int(np.sum(counts))))

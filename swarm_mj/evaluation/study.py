@@ -24,7 +24,19 @@ BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an
 class Study:
     """The settings of an evaluation; all policies fly the same missions in each regime.
 
-    Raises ValueError for nothing to evaluate, an unknown policy, or a number out of range.
+    Args:
+        policies: Names among `POLICIES`, `module:Name` of a user's own, or folders of learned ones.
+        regimes: The missions' numbers; a regime is flown from each seed.
+        episodes: Missions of each policy in each regime.
+        seed: Of the first mission; the others follow one by one.
+        probability: Of a transmission, for the policies that have one; None is each policy's own.
+        is_deterministic: Whether learned policies take the most probable recipient.
+        features: Users' own extractors that learned policies may load.
+        components: Channel, controller and scene, where they are not the mission's own.
+        baseline: Whom the others are compared to, mission by mission; None is the first policy.
+
+    Raises:
+        ValueError: There is nothing to evaluate, a policy is unknown, or a number out of range.
     """
 
     policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones
@@ -91,17 +103,16 @@ class Study:
     def batches(self) -> tuple[Batch, ...]:
         """All the work, pair by pair, in the order of the seeds."""
         seeds = range(self.seed, self.seed + self.episodes)
-        parts = [seeds[start : start + BATCH_SIZE] for start in range(0, len(seeds), BATCH_SIZE)]
         batches: list[Batch] = []
         for regime, policy in self.pairs:
-            for part in parts:
+            for start in range(0, self.episodes, BATCH_SIZE):
                 batch = Batch(
                     policy=policy,
                     how=self._how(policy),
                     components=self.components,
                     parameters=self.parameters[regime, policy],
                     mission=regime,
-                    seeds=part,
+                    seeds=seeds[start : start + BATCH_SIZE],
                 )
                 batches.append(batch)
         return tuple(batches)

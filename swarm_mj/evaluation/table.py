@@ -9,18 +9,8 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.evaluation.results import (
-    BRIEF,
-    CARRIES_MORE,
-    NONE,
-    WIDE,
-    Result,
-    Shown,
-    carries_more,
-    config_of,
-    number,
-    said,
-)
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
+from swarm_mj.evaluation.table_columns import BRIEF, NONE, WIDE, Shown, number, said
 from swarm_mj.mission.presets import paper
 from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.protocol.packets import BITS_PER_BYTE
@@ -40,11 +30,26 @@ def results_text(results: Sequence[Result]) -> str:
 def print_results(
     results: Sequence[Result], file: io.StringIO | None = None, *, is_wide: bool = False
 ) -> None:
-    """Print a table per regime; a wide one has all columns. A file gets plain text."""
-    how: dict[str, Any] = {"file": file, "force_terminal": None if file is None else False}
-    how |= {"force_jupyter": False, "highlight": False, "markup": False}
+    """Print a table for each regime, the lowest age first, and what its columns mean.
+
+    Args:
+        results: Those of a regime follow each other.
+        file: Gets plain text; None is the terminal.
+        is_wide: Whether to print all columns, and not only what most people read.
+    """
+    how: dict[str, Any] = {
+        "file": file,
+        "force_terminal": None if file is None else False,  # None: rich finds out
+        "force_jupyter": False,
+        # Names and numbers stay as they are, even where they look like rich's markup.
+        "highlight": False,
+        "markup": False,
+    }
     console = Console(**how)
-    longest = max(len(line) for result in results for line in _name(result).splitlines())
+    longest = 0
+    for result in results:
+        for line in _name(result).splitlines():
+            longest = max(longest, len(line))
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
     wide = Console(width=width, **how)
     columns = WIDE if is_wide else BRIEF
@@ -70,7 +75,10 @@ def missions_of(result: Result) -> str:
         "arena": None if result.arena == OPEN else result.arena,
         "prior knowledge": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
     }
-    own = "".join(f",\n{kind} {name}" for kind, name in parts.items() if name)
+    own = ""
+    for kind, name in parts.items():
+        if name:
+            own += f",\n{kind} {name}"
     fates = ""
     if config_of(result).get("collide"):
         fates += ", robots collide"
@@ -118,20 +126,26 @@ def _name(result: Result) -> str:
 
 
 def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
-    sent = [
-        f"{result.policy} {BITS_PER_BYTE * result.bytes_per_second / 1000.0:,.1f}"
-        for result in results
-        if result.bytes_per_second is not None
-    ]
+    """Yield the lines below a regime's table: what is of few policies, or the same for most."""
+    sent: list[str] = []
+    late: list[str] = []
+    bounds: list[float] = []  # [windows]
+    for result in results:
+        if result.bytes_per_second is not None:  # older files do not say
+            kbit_per_s = BITS_PER_BYTE * result.bytes_per_second / 1000.0
+            sent.append(f"{result.policy} {kbit_per_s:,.1f}")
+        if result.complete_share < 0.5:
+            late.append(f"{result.policy} {result.complete_share:.0%}")
+        if result.aoi_floor_mean is not None:
+            bounds.append(result.aoi_floor_mean)
     if sent and is_wide:
         yield f"sent by the team [kbit/s]: {', '.join(sent)}"
-    late = [f"{r.policy} {r.complete_share:.0%}" for r in results if r.complete_share < 0.5]
     if late:
         yield f"missions that ended with everyone having heard of everyone: {', '.join(late)}"
     # A flock's course depends on its policy, so each policy may have a bound of its own.
-    bounds = [result.aoi_floor_mean for result in results if result.aoi_floor_mean is not None]
-    low, high = f"{min(bounds, default=0):.2f}", f"{max(bounds, default=0):.2f}"
-    if float(high) > 0.0:  # or it says nothing
+    low = f"{min(bounds, default=0.0):.2f}"
+    high = f"{max(bounds, default=0.0):.2f}"
+    if float(high) > 0.0:  # a bound of 0 says nothing
         shown = low if low == high else f"{low} to {high}, by policy"
         yield f"lower bound (connectivity): {shown}"
 

@@ -18,15 +18,21 @@ from jaxtyping import Float
 from swarm_mj.evaluation.batch import BatchCosts, costs_of
 from swarm_mj.evaluation.samples import standard_error
 from swarm_mj.learning import selection
-from swarm_mj.learning.selection import COMPARED, JUDGED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
-from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED, Training
+from swarm_mj.learning.selection import COMPARED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
+from swarm_mj.learning.settings import (
+    CHOICE_SEED,
+    HELD_OUT_SEED,
+    LEARNED_COSTS,
+    TEST_SEED,
+    Training,
+)
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.policies.gnn.policy import GnnPolicy
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
+from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
@@ -88,7 +94,7 @@ def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWin
     """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
     if curve:
         names: set[str] = set()
-        for cost in JUDGED:
+        for cost in LEARNED_COSTS:
             names |= {selection.column(cost, name) for name in selection.REFERENCES}
         return {name: x for name, x in curve[0].items() if name in names}
     columns: Row = {}
@@ -96,7 +102,7 @@ def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWin
     flights = Flights(training=training, on_window=on_window, total=len(flown_by))
     for name, num_missions in flown_by.items():
         flown = flights.fly(partial(make_policy, name), HELD_OUT_SEED, num_missions)
-        for cost in JUDGED:
+        for cost in LEARNED_COSTS:
             columns[selection.column(cost, name)] = _mean(_samples(flown, cost))
     return columns
 
@@ -121,13 +127,13 @@ def choose(
 
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
     costs = flights.fly(flies(kept), TEST_SEED, size)
-    own = _samples(costs, training.reward)
+    own = _samples(costs, training.cost)
     compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
     others: dict[str, Cost] = {}
     for name, policy_of in compared.items():
-        samples = _samples(flights.fly(policy_of, TEST_SEED, size), training.reward)
+        samples = _samples(flights.fly(policy_of, TEST_SEED, size), training.cost)
         others[name] = _compared(samples, own)
     choice = Choice(
         decisions=int(kept["decisions"]),
@@ -178,9 +184,9 @@ def record_replay(
 
 
 def _means(training: Training, costs: Flown) -> Row:
-    age = _samples(costs, AOI.reward)
-    variance = _samples(costs, VELOCITY_VARIANCE.reward)
-    if training.reward == "aoi":
+    age = _samples(costs, AOI)
+    variance = _samples(costs, VELOCITY_VARIANCE)
+    if training.cost is AOI:
         # Ages grow with the team; divided by its size, no size outweighs the others.
         objective = [of_size / n for of_size, n in zip(age, training.robots, strict=True)]
     else:
@@ -200,13 +206,9 @@ def _means(training: Training, costs: Flown) -> Row:
     return means
 
 
-def _samples(costs: Flown, reward: str) -> Samples:
-    """Return each mission's cost, by what the reward for it is called."""
-    if reward == AOI.reward:
-        return [each.aoi for each in costs]
-    if reward == VELOCITY_VARIANCE.reward:
-        return [each.velocity_variance for each in costs]
-    raise ValueError(f"no cost is called {reward}; there are {', '.join(JUDGED)}")
+def _samples(costs: Flown, cost: MissionCost) -> Samples:
+    """Return each mission's cost, by team size."""
+    return [each.of(cost) for each in costs]
 
 
 def _compared(samples: Samples, kept: Samples) -> Cost:

@@ -11,7 +11,7 @@ from pathlib import Path
 
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
-from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
+from swarm_mj.protocol.mission_costs import MissionCost
 from swarm_mj.system.writing import write_csv
 
 ORACLE = "greedy-oracle"
@@ -22,7 +22,6 @@ REFERENCES = {
     ORACLE: "knows where all robots are and what they know",
 }
 COMPARED = ("tdma", "spatial-tdma")  # at the end, too: the oracle takes longer than the network
-JUDGED = (AOI.reward, VELOCITY_VARIANCE.reward)  # costs that a run can lower, as rewards call them
 ORACLE_MISSIONS = 4  # of each team size: a window takes it 12 ms at 40 robots, 36 ms at 80 ...
 ORACLE_ROBOTS = 100  # ... and 472 ms at 200: larger teams it does not fly
 NUM_BEST = 3  # evaluations whose policies are flown again
@@ -149,9 +148,9 @@ class Status:
 Listener = Callable[[Status], bool]
 
 
-def column(cost: str, name: str) -> str:
+def column(cost: MissionCost, name: str) -> str:
     """Return the learning curve's column for a cost of a policy of `REFERENCES`."""
-    return f"{cost}_{name}".replace("-", "_")
+    return f"{cost.column}_{name}".replace("-", "_")
 
 
 def reference_missions(training: Training) -> dict[str, int]:

@@ -9,12 +9,19 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
 from swarm_mj.policies.policy_config import GnnShape, check_fit
+from swarm_mj.protocol.mission_costs import (
+    AOI,
+    BY_REWARD,
+    VELOCITY_VARIANCE,
+    MissionCost,
+    Reward,
+)
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check, check_value, common_setting, setting
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
-Reward = Literal["aoi", "velocity-variance"]  # the cost whose negative a team is paid
+LEARNED_COSTS = (AOI, VELOCITY_VARIANCE)  # that a run can lower
 # First seeds of the missions of evaluations, of those that choose a policy, and of those that tell
 # its cost. Training and environments draw from 2^40 on.
 HELD_OUT_SEED, CHOICE_SEED, TEST_SEED = 500_000, 510_000, 520_000
@@ -189,7 +196,7 @@ class Training:
     reward: Reward = common_setting(
         "aoi",
         "the cost to lower; velocity-variance needs --credit team",
-        choices=get_args(Reward),
+        choices=[cost.reward for cost in LEARNED_COSTS],
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
@@ -217,8 +224,13 @@ class Training:
         check_fit(self.network, self.features)
         if not self.robots:
             raise ValueError("robots must have at least 1 size")
-        if self.credit_assignment == "robot" and self.reward != "aoi":
+        if self.credit_assignment == "robot" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
+
+    @property
+    def cost(self) -> MissionCost:
+        """The cost to lower, whose minus a team is paid."""
+        return BY_REWARD[self.reward]
 
     @property
     def own(self) -> dict[str, str]:

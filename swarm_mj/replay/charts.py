@@ -9,6 +9,7 @@ from jaxtyping import Bool, Float, Int, Shaped
 
 from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.protocol.costs import TaskCost
+from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.layers import Entity, View
 from swarm_mj.replay.links import by_kind, is_other
@@ -200,7 +201,7 @@ def plots(log: Log) -> list[Plot]:
     cost = log.task_cost
     if cost is None and log.facts.mission.flocks:
         variance = log.velocity_variance_m2ps2
-        cost = TaskCost(name="velocity variance", unit="m²/s²", value=variance)
+        cost = TaskCost(name=VELOCITY_VARIANCE.title, unit=VELOCITY_VARIANCE.unit, value=variance)
     if cost is not None:
         found.append(_cost_plot(cost))
     return found

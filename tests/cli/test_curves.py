@@ -8,7 +8,7 @@ import matplotlib.pyplot as plt
 import numpy as np
 import pytest
 
-from swarm_mj.api.charts import draw_learning
+from swarm_mj.api.charts import LearningCurve, draw_learning
 from swarm_mj.cli import main
 from swarm_mj.cli.curves import _lines, _read
 from swarm_mj.evaluation.figures.style import CAPTION
@@ -56,7 +56,7 @@ def test_a_run_that_began_with_a_stored_policy_is_a_line_of_its_own(runs):
     put_run(runs / "b", FIRST, seed=2)
     whole = [_read(runs / name) for name in ("runs/a-1", "b")]
     assert len(_lines(whole)) == 1
-    write_run(runs / "b", replace(whole[1][1], init=Path("/a/policy.safetensors")))
+    write_run(runs / "b", replace(whole[1].asked, init=Path("/a/policy.safetensors")))
     assert len(_lines([whole[0], _read(runs / "b")])) == 2
 
 
@@ -67,16 +67,23 @@ def test_seeds_are_one_line_in_the_band_of_their_range_and_other_settings_anothe
     lines = _lines([_read(runs / name) for name in (*CURVES, "b")])
     seeds, alone = lines.items()
     assert seeds[0] == f"{runs}/runs/a-1 to a-2: mean and range of 2 seeds"
-    np.testing.assert_array_equal(
-        seeds[1], [[0, 100, 200], [60, 25, 29], [60, 20, 24], [60, 30, 34]]
-    )
+    np.testing.assert_array_equal(seeds[1].decisions, [0, 100, 200])
+    np.testing.assert_array_equal(seeds[1].age, [60, 25, 29])
+    np.testing.assert_array_equal(seeds[1].low, [60, 20, 24])
+    np.testing.assert_array_equal(seeds[1].high, [60, 30, 34])
     assert alone[0] == str(runs / "b")
-    assert alone[1].tolist() == [[0], [60], [60], [60]]
+    assert alone[1].decisions.tolist() == [0]
+    assert alone[1].low.tolist() == alone[1].age.tolist() == alone[1].high.tolist() == [60]
 
 
 def test_lines_bands_and_levels_stand_where_they_should():
-    line = np.array([[0.0, 100.0], [60.0, 25.0], [60.0, 20.0], [60.0, 30.0]])
-    figure = draw_learning({"mine $": line}, {"tdma": 26.25}, "an origin")
+    curve = LearningCurve(
+        decisions=np.array([0.0, 100.0]),
+        age=np.array([60.0, 25.0]),
+        low=np.array([60.0, 20.0]),
+        high=np.array([60.0, 30.0]),
+    )
+    figure = draw_learning({"mine $": curve}, {"tdma": 26.25}, "an origin")
     (axes,) = figure.axes
     drawn, level = axes.lines
     assert (drawn.get_xdata().tolist(), drawn.get_ydata().tolist()) == ([0, 100], [60, 25])

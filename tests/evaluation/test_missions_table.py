@@ -11,6 +11,7 @@ from pyarrow import parquet
 import swarm_mj
 from swarm_mj.evaluation.missions_table import compared, read_missions, write_missions
 from swarm_mj.mission import Mission, paper
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST
 
 MISSION = paper("flocking", num_robots=5, num_windows=6, range_ratio=1.0)
 
@@ -40,8 +41,10 @@ def test_a_file_has_a_row_for_each_mission_with_its_fields_and_the_study(flown, 
     rows = pd.read_parquet(path)
     assert list(rows["policy"]) == ["mst"] * 3 + ["tdma"] * 3
     assert list(rows["seed"]) == [5, 6, 7] * 2
-    for cost in ("aoi", "velocity_variance", "task_cost"):
-        assert list(rows[cost]) == [x for each in flown for x in getattr(each, cost)]
+    mst, tdma = flown
+    assert list(rows["aoi"]) == mst.aoi + tdma.aoi
+    assert list(rows["velocity_variance"]) == mst.velocity_variance + tdma.velocity_variance
+    assert list(rows["task_cost"]) == mst.task_cost + tdma.task_cost
     for spec in fields(Mission):
         (value,) = set(rows[spec.name].astype(object).where(rows[spec.name].notna(), None))
         assert value == getattr(MISSION, spec.name), spec.name
@@ -65,17 +68,17 @@ def test_differences_are_of_the_same_seeds_by_hand(written):
     """Seeds 5 to 8 before, 6 to 9 after: of 6, 7 and 8 the differences are 1, 2 and 6."""
     before = read_missions(written("a.parquet", [90.0, 10.0, 20.0, 30.0]))
     after = read_missions(written("b.parquet", [11.0, 22.0, 36.0, 99.0], seed=6))
-    (row,) = compared(before, after, "aoi").to_dict("records")
+    (row,) = compared(before, after, AOI).to_dict("records")
     assert (row["policy"], row["before"], row["after"], row["difference"]) == ("mst", 20, 23, 3)
     assert 1.0 <= row["low"] < 3.0 < row["high"] <= 6.0
     assert (row["missions"], row["only before"], row["only after"]) == (3, 1, 1)
-    assert compared(before, after, "task_cost").empty
+    assert compared(before, after, TASK_COST).empty
 
 
 def test_regimes_are_told_apart_by_what_differs_and_those_that_one_lacks_are_shown(written):
     paths = [written(f"{x}.parquet", [10.0, 12.0], erasure=x) for x in (0.0, 0.1, 0.3)]
     none, some, much = map(read_missions, paths)
-    table = compared(pd.concat([none, some]), pd.concat([some, much]), "aoi")
+    table = compared(pd.concat([none, some]), pd.concat([some, much]), AOI)
     assert list(table.columns[:2]) == ["erasure", "policy"]
     assert list(table["erasure"]) == [0.0, 0.1, 0.3]
     assert list(table["missions"]) == [0, 2, 0]
@@ -90,7 +93,7 @@ def test_a_file_without_a_newer_field_had_its_default(written):
     older.to_parquet(path)
     assert set(read_missions(path)["erasure"]) == {Mission().erasure}
     newer = read_missions(written("n.parquet", [2.0, 4.0]))
-    assert list(compared(read_missions(path), newer, "aoi")["difference"]) == [1.5]
+    assert list(compared(read_missions(path), newer, AOI)["difference"]) == [1.5]
 
 
 def test_what_is_no_parquet_is_refused(tmp_path):

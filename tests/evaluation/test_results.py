@@ -1,7 +1,8 @@
 """Result files: written and read back as they were, and refused with a reason otherwise."""
 
 import csv
-from dataclasses import asdict, dataclass, fields
+import math
+from dataclasses import asdict, dataclass, fields, replace
 from types import NoneType
 from typing import get_args
 
@@ -9,15 +10,14 @@ import pytest
 
 from swarm_mj.evaluation.measurements import column, later_column
 from swarm_mj.evaluation.results import (
-    BRIEF,
     COLUMNS,
-    WIDE,
     Result,
     computation,
     read_results,
-    said,
+    statistics_of,
     write_results,
 )
+from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE
 
 TEXTS = {
     "policy": "mst",
@@ -137,15 +137,22 @@ def test_a_column_that_nothing_computes_is_named_at_once():
     assert tuple(spec.name for spec in fields(Result)) == COLUMNS
 
 
-@pytest.mark.parametrize("columns", [BRIEF, WIDE])
-@pytest.mark.parametrize("cost", ["velocity variance", "spread"])
-@pytest.mark.parametrize("task", ["stationary", "flocking"])
-def test_every_column_shown_has_a_heading_of_its_own_and_at_most_two_lines(columns, cost, task):
-    result = some_result(task=task, task_cost_name=cost)
-    shown = [each for each in columns if each.applies is None or each.applies(result)]
-    headings = [said(each.heading, result) for each in shown]
-    assert len(set(headings)) == len(headings)
-    for heading, column_shown in zip(headings, shown, strict=True):
-        cell = column_shown.cell(result)
-        assert cell
-        assert max(heading.count("\n"), cell.count("\n")) <= 1
+def test_each_cost_has_the_statistics_of_its_own_columns():
+    result = some_result(
+        aoi_mean=40.0,
+        aoi_sem=1.5,
+        aoi_ci_low=37.0,
+        aoi_ci_high=43.0,
+        velocity_variance_mean=0.2,
+        velocity_variance_sem=None,
+        velocity_variance_ci_low=None,
+        velocity_variance_ci_high=0.3,
+        task_cost_mean=7.0,
+        task_cost_sem=0.5,
+    )
+    assert statistics_of(result, AOI) == (40.0, 1.5, 37.0, 43.0)
+    assert statistics_of(result, VELOCITY_VARIANCE) == (0.2, None, None, 0.3)
+    assert statistics_of(result, TASK_COST) == (7.0, 0.5, None, None)
+    assert math.isnan(statistics_of(some_result(task_cost_mean=None), TASK_COST).mean)
+    with pytest.raises(ValueError, match="results have no cost fuel"):
+        statistics_of(result, replace(AOI, column="fuel"))

@@ -21,5 +21,7 @@ def test_windows_tell_the_costs_by_their_names():
 
 
 def test_names_are_different():
-    for names in zip(*MISSION_COSTS, strict=True):
-        assert len(set(names)) == len(MISSION_COSTS)
+    assert len({cost.column for cost in MISSION_COSTS}) == len(MISSION_COSTS)
+    assert len({cost.reward for cost in MISSION_COSTS}) == len(MISSION_COSTS)
+    assert len({cost.info for cost in MISSION_COSTS}) == len(MISSION_COSTS)
+    assert len({cost.title for cost in MISSION_COSTS}) == len(MISSION_COSTS)

@@ -8,9 +8,10 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.evaluation.published import OPTIONS, Cost, ResultFigure, points
-from swarm_mj.evaluation.results import Result, carries_more, config_of
+from swarm_mj.evaluation.published import OPTIONS, ResultFigure, points
+from swarm_mj.evaluation.results import Result, carries_more, config_of, statistics_of
 from swarm_mj.mission import PAPERS
+from swarm_mj.protocol.mission_costs import MissionCost
 from swarm_mj.simulation.components import CALLED_WITH
 from swarm_mj.system.fields import as_typed
 
@@ -46,7 +47,14 @@ class _Place(NamedTuple):
 
 
 def preset_of(results: Sequence[Result]) -> str:
-    """Return the one preset of all results, one of the paper's; raise ValueError otherwise."""
+    """Return the one preset of all results.
+
+    Args:
+        results: Rows of result files, at least one.
+
+    Raises:
+        ValueError: There are several presets, or it is none of the paper's.
+    """
     first, *others = dict.fromkeys(result.preset for result in results)
     if others:
         raise ValueError(
@@ -62,7 +70,17 @@ def preset_of(results: Sequence[Result]) -> str:
 
 
 def results_of(figure: ResultFigure, results: Sequence[Result]) -> list[Result]:
-    """Select a figure's results, in order; ValueError for none, or for some that differ."""
+    """Return a figure's results, in order.
+
+    Args:
+        figure: One of the paper's.
+        results: Rows of result files; those of other missions than the figure's are passed over.
+
+    Raises:
+        NoPointsError: None of the results is of the figure's missions.
+        ValueError: Some results differ in more than the figure's x, so that a comparison would be
+            of missions rather than of policies.
+    """
     preset = preset_of(results)
     regime = figure.mission(preset)
     wanted = {name: getattr(regime, name) for name in ("task", *figure.fixed)}
@@ -83,15 +101,22 @@ def _has(result: Result, wanted: Mapping[str, object]) -> bool:
     return all(getattr(result, name) == value for name, value in wanted.items())
 
 
-def curves(figure: ResultFigure, cost: Cost, results: Sequence[Result]) -> list[Curve]:
-    """Return the published curves of a cost, by its column, then those of the results."""
+def curves(figure: ResultFigure, cost: MissionCost, results: Sequence[Result]) -> list[Curve]:
+    """Return the curves of a cost: the published ones, then those of the results.
+
+    Args:
+        figure: One of the paper's.
+        cost: What they show, in its unit.
+        results: Those of the figure, as `results_of` selects them.
+    """
     return [*_published_curves(figure, cost), *_own_curves(figure, cost, results)]
 
 
-def _published_curves(figure: ResultFigure, cost: Cost) -> list[Curve]:
+def _published_curves(figure: ResultFigure, cost: MissionCost) -> list[Curve]:
+    """Return the curves that the paper's figure has, a method each."""
     its_points: dict[str, list[_Place]] = {}
     for point in points():
-        if point.figure == figure.published and point.cost == cost:
+        if point.figure == figure.published and point.cost == cost.column:
             place = _Place(x=point.x, mean=point.mean, sem=point.sem)
             its_points.setdefault(point.method, []).append(place)
     drawn = []
@@ -103,20 +128,19 @@ def _published_curves(figure: ResultFigure, cost: Cost) -> list[Curve]:
     return drawn
 
 
-def _own_curves(figure: ResultFigure, cost: Cost, results: Sequence[Result]) -> list[Curve]:
+def _own_curves(figure: ResultFigure, cost: MissionCost, results: Sequence[Result]) -> list[Curve]:
+    """Return the curves of the results, a method each; several trainings are one method."""
     more = {method_of(result) for result in results if carries_more(result)}
     own: dict[tuple[str, bool], list[_Place]] = {}
     for result in results:
         x = _x(figure, result)
-        mean = getattr(result, f"{cost}_mean")
-        sem = getattr(result, f"{cost}_sem")
-        if sem is None:
-            sem = math.nan
+        found = statistics_of(result, cost)
+        sem = math.nan if found.sem is None else found.sem
         # A policy without a receptive field is level: the same at both ends of the axis.
         ends = (figure.xs[0], figure.xs[-1]) if x is None else (x,)
         places = own.setdefault((method_of(result), x is None), [])
         for end in ends:
-            places.append(_Place(x=end, mean=mean, sem=sem))
+            places.append(_Place(x=end, mean=found.mean, sem=sem))
     drawn = []
     for (method, is_level), places in own.items():
         drawn.append(_curve(method, places, is_level=is_level, carries_more=method in more))
@@ -168,7 +192,8 @@ def _x(figure: ResultFigure, result: Result) -> float | None:
 def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> None:
     """Raise ValueError unless a result is evaluated like the first, on the paper's missions."""
     for name in AGREED:
-        ours, theirs = getattr(first, name), getattr(result, name)
+        ours = getattr(first, name)
+        theirs = getattr(result, name)
         if ours != theirs:
             raise ValueError(
                 f"{figure.name} compares results of one {name}, not {ours} "
@@ -176,6 +201,8 @@ def _check_comparable(figure: ResultFigure, result: Result, first: Result) -> No
                 f"all alike with `{figure.command(first.preset)}`"
             )
     swept = set(OPTIONS) - set(figure.fixed)
+    # The config has fields of the mission that are no columns. Where both lack one, the file is
+    # older than the field, and its missions were the paper's.
     has = config_of(result) | asdict(result)
     papers = asdict(figure.mission(result.preset)) | dict.fromkeys(BEYOND)
     for name, expected in papers.items():

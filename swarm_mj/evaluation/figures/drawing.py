@@ -76,7 +76,16 @@ def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[st
 def draw_curves(
     figure: ResultFigure, found: Sequence[Result], costs: Sequence[Sequence[Curve]]
 ) -> Figure:
-    """Draw the curves of each of the figure's costs, with the origin of the results below."""
+    """Draw the curves of a figure, with the origin of the results below.
+
+    Args:
+        figure: What is drawn: its panels, axes and title.
+        found: The results that the curves are from, for the head and the caption.
+        costs: The curves of each panel.
+
+    Returns:
+        The figure, which `style.save` writes.
+    """
     num_panels = len(figure.panels)
     height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
     with styled():
@@ -127,7 +136,8 @@ def _draw_curve(axes: Axes, curve: Curve) -> None:
 
     A band shows several trainings, or a level's error.
     """
-    look, is_published = look_of(curve.method), curve.is_published
+    look = look_of(curve.method)
+    is_published = curve.is_published
     line = {
         "label": name_of(curve) + (", published" if is_published else ""),
         "color": look.colour,
@@ -164,12 +174,13 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, shown: Sequence[Cu
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_minor_locator(NullLocator())
         axes.yaxis.set_major_formatter(PLAIN)
-    axes.set_title(panel.label)
+    axes.set_title(panel.cost.label)
 
 
 def _head(
     drawing: Figure, figure: ResultFigure, results: Sequence[Result], height_in: float
 ) -> None:
+    """Write what the figure shows and what is fixed in it, and the key of lines and markers."""
     fixed = [FIXED[name].format(getattr(results[0], name)) for name in figure.fixed]
     regime = ", ".join([figure.task.replace("-", " "), *fixed])
     line = 1.0 - 0.28 / height_in

@@ -12,6 +12,7 @@ from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.costs import velocity_variance
+from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.packages import commit, version
@@ -72,7 +73,8 @@ def _draw(axes: Axes, mission: Mission, time_s: float, team: RobotStates) -> Qui
     key_mps = float(f"{fastest_mps:.1g}")
     axes.quiverkey(arrows, 0.8, 1.11, key_mps, f"{key_mps:g} m/s", labelpos="E", color=FAINT)
     variance_m2ps2 = velocity_variance(team.velocity_mps)[0]
-    axes.set_title(f"after {time_s:g} s\nvelocity variance {variance_m2ps2:.2g} m²/s²")
+    cost = VELOCITY_VARIANCE
+    axes.set_title(f"after {time_s:g} s\n{cost.title} {variance_m2ps2:.2g} {cost.unit}")
     axes.set_xlabel("x [m]")
     axes.set_aspect("equal")
     axes.margins(0.15)  # for arrows

@@ -87,20 +87,47 @@ def styled() -> AbstractContextManager[None]:
 
 
 def write_caption(figure: Figure, text: str, x: float = 0.01, y: float | None = None) -> None:
-    """Write the origin of a figure's numbers, in small type; a layout finds room for it."""
+    """Write the origin of a figure's numbers, in small type.
+
+    Args:
+        figure: Whose numbers they are.
+        text: The origin, in one line or more.
+        x: Where it begins, a share of the figure's width.
+        y: Where it stands, a share of the height; None leaves room for it to the figure's layout.
+    """
     look = {"fontsize": 7, "color": FAINT, "ha": "left"}
     figure.supxlabel(escape_mathtext(text), x=x, y=y, gid=CAPTION, **look)
 
 
 def code(version: str, *commits: str | None) -> str:
-    """Return what made a figure's numbers, for its caption; `+` is a commit that was changed."""
-    known = dict.fromkeys(each[:SHORT] + "+" * each.endswith("+") for each in commits if each)
-    noun = ", commits" if len(known) > 1 else ", commit" if known else ""
-    return f"swarm_mj {version}{noun} {', '.join(known)}".rstrip()
+    """Return what made a figure's numbers, for its caption.
+
+    Args:
+        version: Of the package.
+        *commits: Of the code, in full, each named once; `+` at the end says that files had been
+            changed since. None is unknown, and is left out.
+    """
+    known: dict[str, None] = {}  # each once, in order
+    for commit in commits:
+        if commit:
+            changed = "+" if commit.endswith("+") else ""
+            known[f"{commit[:SHORT]}{changed}"] = None
+    if not known:
+        return f"swarm_mj {version}"
+    noun = "commit" if len(known) == 1 else "commits"
+    return f"swarm_mj {version}, {noun} {', '.join(known)}"
 
 
 def save(figure: Figure, path: Path) -> None:
-    """Write a figure, always the same bytes, with its caption as metadata; raise OSError if not."""
+    """Write a figure, always the same bytes, with its caption as metadata.
+
+    Args:
+        figure: It has had its caption from `write_caption`.
+        path: Ends in one of `METADATA`, and is replaced if it exists.
+
+    Raises:
+        OSError: The file cannot be written.
+    """
     kind = path.suffix.removeprefix(".").lower()
     field, undated = METADATA[kind]
     [caption] = figure.findobj(lambda artist: artist.get_gid() == CAPTION)

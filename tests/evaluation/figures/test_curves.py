@@ -7,11 +7,12 @@ from synthetic import altered, result, sweep
 from swarm_mj.evaluation.figures.curves import curves, results_of
 from swarm_mj.evaluation.figures.drawing import caption
 from swarm_mj.evaluation.published import RESULT_FIGURES
+from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
 
 FIG3, FIG4, FIG5, FIG6 = RESULT_FIGURES.values()
 
 
-def found(figure, results, cost="aoi"):
+def found(figure, results, cost=AOI):
     """Curves by method and source."""
     its = curves(figure, cost, results_of(figure, results))
     return {(curve.method, curve.is_published): curve for curve in its}
@@ -39,7 +40,7 @@ def test_published_values_sit_at_their_x():
 
 def test_both_costs_of_a_flock():
     results = [result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01)]
-    variance = found(FIG6, results, "velocity_variance")
+    variance = found(FIG6, results, VELOCITY_VARIANCE)
     np.testing.assert_array_equal(variance["mst", False].mean, [0.2])
     assert variance["GNN trained on AoI", True].mean[-1] == 3.0422
     assert found(FIG6, results)["GNN trained on AoI", True].mean[-1] == 39.609
