@@ -11,6 +11,7 @@ from swarm_mj.policies.about import Information
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
+from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.policies.stored import load_policy, read_weights
 from swarm_mj.system.packages import asset
@@ -43,6 +44,7 @@ def test_its_weights_are_those_of_1_0_0():
 
 def test_its_weights_are_whole_and_the_network_they_belong_to_is_small():
     weights, config = read_weights(FILE)
+    assert isinstance(config, GnnConfig)
     num_numbers = 0
     for weight in weights.values():
         assert weight.dtype == np.float32
