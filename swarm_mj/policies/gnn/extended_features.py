@@ -171,7 +171,7 @@ def _write_ages_and_news(
                 of_k.turn_rank = rank[k]
                 of_k.known_share = known_share
                 of_k.team_size = num_robots / TEAM
-                # Who is out of range cannot be told anything, so there is no news to it.
+                # Who is out of range cannot be reached, so there is no news to it.
                 of_k.news = 0.0
                 of_k.unsaid_news = 0.0
                 if of_k.is_near > 0.0:
