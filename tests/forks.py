@@ -10,8 +10,8 @@ from types import SimpleNamespace
 FORK_FOR_EACH_LINE = """
 import importlib, json, os, runpy, sys
 from swarm_mj.cli import COMMANDS
-for name in COMMANDS:
-    importlib.import_module(f"swarm_mj.cli.{name}")
+for name in (*(f"swarm_mj.cli.{name}" for name in COMMANDS), *sys.argv[1:]):
+    importlib.import_module(name)
 for line in sys.stdin:
     folder, said, sys.argv = json.loads(line)
     child = os.fork()
@@ -42,11 +42,11 @@ def files(folder):
 class Forks:
     """A process that has the package loaded, and forks itself for each program."""
 
-    def __init__(self, folder):
-        """Keeps what programs say in the folder."""
+    def __init__(self, folder, modules=()):
+        """Keeps what programs say in the folder; loads more modules for all programs, by name."""
         self._said = [folder / "stdout", folder / "stderr"]
         self._process = subprocess.Popen(
-            [sys.executable, "-c", FORK_FOR_EACH_LINE],
+            [sys.executable, "-c", FORK_FOR_EACH_LINE, *modules],
             stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True,
         )  # fmt: skip
 

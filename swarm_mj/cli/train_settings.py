@@ -55,8 +55,17 @@ def setting_options() -> Iterator[Option]:
 
 def given_settings(given: dict[str, Any]) -> dict[str, Any]:
     """Return the settings that were given, by their places; a value of several counts once."""
-    values = {place: given[place] for place in SPECS if place in given}
-    return {at: tuple(dict.fromkeys(x)) if isinstance(x, tuple) else x for at, x in values.items()}
+    settings = {}
+    for place in SPECS:
+        if place not in given:
+            continue
+        value = given[place]
+        if isinstance(value, tuple):
+            value = tuple(
+                dict.fromkeys(value)
+            )  # in their order, which decides who is trained first
+        settings[place] = value
+    return settings
 
 
 def asked_settings(
@@ -66,20 +75,18 @@ def asked_settings(
 
     `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
-    own, network, asked = (_part(part, given) for part in ("", "network", "mission"))
+    own = _part("", given)
+    network = _part("network", given)
+    ppo = _part("ppo", given)
     sizes = own.get("robots", (Mission().num_robots,))
-    mission = make_mission(**{"task": "stationary", "num_robots": sizes[0]} | asked)
-    check_in_use(asked, [mission], FLAGS.__getitem__)
+    mission = _mission(_part("mission", given), sizes[0])
     training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
     if init is not None:
-        same = {name: getattr(init, name) for name in ("network", "features", "silence_logit")}
-        training = replace(training, **same)
-        shape = {at: x for at, x in given.items() if at.startswith(("features", "network"))}
-        refuse_others(shape, training, f"the policy {init_path}")
-        check_named(init.features, own_names(given), f"policy {init_path}")
+        training = _begun_with(training, init, f"policy {init_path}", given)
     missions = _missions(own.get("missions"), training.missions, len(sizes))
     components = Components(**_part("components", given))
     training = replace(training, missions=missions, components=components)
+    # The user's own features count only once they are loaded, and the network is made for them.
     load_own(own.get("features", training.features), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
@@ -87,8 +94,8 @@ def asked_settings(
         training,
         groups=_num_groups(missions, len(sizes)),
         network=replace(training.network, **network),
-        ppo=replace(training.ppo, **_part("ppo", given)),
-        **own,
+        ppo=replace(training.ppo, **ppo),
+        **own,  # last: what is given for the run itself goes before what follows from the rest
     )
     for size in training.robots:
         check_whole("training", replace(mission, num_robots=size))
@@ -98,10 +105,38 @@ def asked_settings(
     return training
 
 
+def _mission(asked: dict[str, Any], num_robots: int) -> Mission:
+    """Return what is flown; raise ValueError for an option that would change nothing."""
+    usual = {"task": "stationary", "num_robots": num_robots}
+    mission = make_mission(**usual | asked)
+    check_in_use(asked, [mission], FLAGS.__getitem__)
+    return mission
+
+
+def _begun_with(
+    training: Training, init: GnnConfig, policy: str, given: dict[str, Any]
+) -> Training:
+    """Return settings that fit a stored policy; raise ValueError if those given say otherwise."""
+    training = replace(
+        training,
+        network=init.network,
+        features=init.features,
+        silence_logit=init.silence_logit,
+    )
+    of_network = {at: x for at, x in given.items() if at.startswith(("features", "network"))}
+    refuse_others(of_network, training, f"the {policy}")
+    check_named(init.features, own_names(given), policy)
+    return training
+
+
 def own_names(given: dict[str, Any]) -> list[str]:
     """Return the names of custom components and features among settings that were given."""
-    may_be = [x for place, x in given.items() if place.startswith(("features", "components."))]
-    return [value for value in may_be if is_own(value)]
+    names: list[str] = []
+    for place, value in given.items():
+        may_be_own = place.startswith(("features", "components."))
+        if may_be_own and is_own(value):
+            names.append(value)
+    return names
 
 
 def load_own(features: str, training: Training) -> None:
@@ -122,8 +157,12 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
 
 def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
     """Return the settings given of one part, by their names in it."""
-    parted = ((place.rpartition("."), value) for place, value in given.items())
-    return {name: value for (owner, _, name), value in parted if owner == part}
+    settings: dict[str, Any] = {}
+    for place, value in given.items():
+        owner, _, name = place.rpartition(".")
+        if owner == part:
+            settings[name] = value
+    return settings
 
 
 def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
@@ -146,14 +185,20 @@ def _usual(place: str) -> str:
     own = about_of(SPECS[place]).shown
     if own is not None:
         return own
-    shown: list[str] = []
-    value_of = attrgetter(place)
-    for credit in ("robot", "team"):
-        missions = (PRESETS["paper"]("stationary"), PRESETS["reference"]("flocking"))
-        usual, other = (value_of(usual_settings(credit, each, (40,))) for each in missions)
-        depends = usual != other and place not in ("mission.preset", "mission.task")
-        shown.append("the preset's own" if depends else as_typed(usual))
-    robot, team = shown
-    if robot == "False":
+    robot = _usual_of("robot", place)
+    team = _usual_of("team", place)
+    if robot == "False":  # a flag, which says by itself that it is off
         return ""
-    return robot if place == "credit_assignment" or robot == team else f"{robot}, team: {team}"
+    if place == "credit_assignment" or robot == team:
+        return robot
+    return f"{robot}, team: {team}"
+
+
+def _usual_of(credit: str, place: str) -> str:
+    value_of = attrgetter(place)
+    usual = value_of(usual_settings(credit, PRESETS["paper"]("stationary"), (40,)))
+    other = value_of(usual_settings(credit, PRESETS["reference"]("flocking"), (40,)))
+    # The two missions differ in preset and task on purpose: of these, the first one's are usual.
+    if usual != other and place not in ("mission.preset", "mission.task"):
+        return "the preset's own"
+    return as_typed(usual)

@@ -1,8 +1,8 @@
 """Checkpoints: all that a run needs to go on as if it had never stopped.
 
-One file of tensors, numbers and strings. It is read without running code from it, and it is whole
-or not there: the sums of its parts are checked, and that the run's settings are those it was made
-with.
+One file of tensors, numbers and strings, read without running code from it. It is written whole or
+not at all; yet disks and copies may damage it later, so its sums are checked when it is read, and
+that it was made with the run's settings.
 """
 
 import io
@@ -38,7 +38,8 @@ def save(
     path: Path, training: Training, model: PPO, progress: Progress, networks: Networks
 ) -> None:
     """Write a checkpoint, between rollouts; raises OSError if the file cannot be written."""
-    name, key, *place = np.random.get_state()  # noqa: NPY002 - PPO shuffles minibatches with it
+    # NumPy's global state, for PPO shuffles minibatches with it.
+    name, key, *place = np.random.get_state()  # noqa: NPY002
     batches = env_of(model).batches
     env = model.get_env()
     normaliser = {}  # of rewards
@@ -47,6 +48,10 @@ def save(
             value = getattr(env.ret_rms, moment)
             normaliser[moment] = torch.tensor(value, dtype=torch.float64)
         normaliser["returns"] = torch.tensor(env.returns)
+    recipients = {}
+    for n, batch in enumerate(batches):
+        decided = np.array(batch.recipients, np.int16).reshape(-1, *batch.shape)
+        recipients[n] = torch.tensor(decided)
     state = {
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
@@ -56,10 +61,9 @@ def save(
         "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
         "normaliser": normaliser,
         "candidates": {at: network.state_dict() for at, network in networks.items()},
-        "recipients": {
-            n: torch.tensor(np.array(batch.recipients, np.int16).reshape(-1, *batch.shape))
-            for n, batch in enumerate(batches)
-        },
+        # When a run goes on, its missions are flown again from seeds and decisions, from which all
+        # that physics, channel and buffers hold follows.
+        "recipients": recipients,
         "seeds": [batch.seeds for batch in batches],
         "last_windows": [batch.last_window for batch in batches],
         "episode_starts": torch.tensor(model._last_episode_starts),
@@ -75,8 +79,8 @@ def save(
 def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks]:
     """Put a model and its missions back to a checkpoint; return its progress and candidates.
 
-    Raises ValueError if the file cannot be read, or is damaged, foreign, of another version, of
-    other settings, or of features that are others now.
+    Raises ValueError if the file cannot be read, is damaged or no checkpoint, or is of another
+    version, of other settings, or of features that are others now.
     """
     state: Any = read_torch(path)
     with _as_damaged(path):
@@ -92,7 +96,7 @@ def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks
 
 @contextmanager
 def _as_damaged(path: Path) -> Iterator[None]:
-    """Let whatever goes wrong say which checkpoint it is, and the way out."""
+    """Turn whatever goes wrong into a ValueError that names the checkpoint and the way out."""
     try:
         yield
     except Exception as error:  # generators of random numbers take states as they please
@@ -109,12 +113,15 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     progress = read_plain(state["progress"], Progress)
     env = env_of(model)
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
-    kept = [int(row["decisions"]) for row in candidates(progress.curve)]
-    networks = {at: policy_of(model).acting_network() for at in kept}
-    for at, network in networks.items():
-        network.load_state_dict(state["candidates"][at])
+    networks = Networks()
+    for row in candidates(progress.curve):
+        decisions = int(row["decisions"])
+        network = policy_of(model).acting_network()
+        network.load_state_dict(state["candidates"][decisions])
+        networks[decisions] = network
     model.policy.load_state_dict(state["weights"])
     optimizer = model.policy.optimizer
+    # Only Adam's moments are the file's; its rate and epsilon are of the settings.
     optimizer.load_state_dict(optimizer.state_dict() | {"state": state["adam"]})
     model.num_timesteps = num_rollouts * model.n_steps * env.num_envs
     model._n_updates = num_rollouts * model.n_epochs
@@ -136,7 +143,7 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
 def read_torch(path: Path) -> object:
     """Return what a file of torch holds, without running code from it.
 
-    Raises ValueError if it is missing, cannot be read, or is damaged or foreign.
+    Raises ValueError if it is missing, cannot be read, is damaged or no file of torch's.
     """
     with open_file(path, "checkpoint") as file:
         try:

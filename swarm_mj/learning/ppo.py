@@ -27,6 +27,7 @@ CPU = torch.device("cpu")
 class DevicePpo(PPO):
     """PPO whose rollouts are on the CPU, and whose passes over them are on a device."""
 
+    # Missions fly on the CPU, so a network on a device would wait for a copy in every window.
     optimises_on = CPU
 
     def train(self) -> None:
@@ -59,7 +60,7 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
     Raises ValueError if the missions or the minibatches cannot be made of these settings, or this
     machine lacks the device, which optimises the networks.
     """
-    torch.set_num_threads(training.threads)
+    torch.set_num_threads(training.threads)  # sums that are divided among them round differently
     ppo = training.ppo
     drops = training.drops_silence
     env: VecEnv = GraphVecEnv(training, np.random.default_rng(training.seed))
@@ -81,7 +82,7 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
             ent_coef=ppo.entropy,
             vf_coef=ppo.value,
             max_grad_norm=ppo.max_gradient_norm,
-            seed=training.seed % 2**32,
+            seed=training.seed % 2**32,  # NumPy's global generator takes no larger one
             device=CPU,
             normalize_advantage=not drops,  # a credit's zero means something
             rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
@@ -133,7 +134,9 @@ class GnnActorCritic(ActorCriticPolicy):
         super().__init__(*given, **others)  # spaces and the rate's schedule come from PPO
 
     def _build(self, lr_schedule: Schedule) -> None:
-        num_outputs = self._shape.num_outputs + self._training.shares_trunk
+        num_outputs = self._shape.num_outputs
+        if self._training.shares_trunk:
+            num_outputs += 1  # the last one is the value, so the others keep their places
         self.network = FastAggregationGnn(replace(self._shape, num_outputs=num_outputs))
         if not self._training.shares_trunk:
             self.value_network = FastAggregationGnn(replace(self._shape, num_outputs=1))
@@ -146,9 +149,9 @@ class GnnActorCritic(ActorCriticPolicy):
         network = empty_network(self._shape)
         weights: dict[str, Tensor] = {}
         for name, tensor in self.network.state_dict().items():
-            is_output = name in ("output.weight", "output.bias")
-            acts = tensor[: self._shape.num_outputs] if is_output else tensor
-            weights[name] = acts.detach().cpu().clone()
+            if name in ("output.weight", "output.bias"):
+                tensor = tensor[: self._shape.num_outputs]  # without the value's row, if it has one
+            weights[name] = tensor.detach().cpu().clone()
         network.load_state_dict(weights, assign=True)
         return network.requires_grad_(False)
 
@@ -157,7 +160,7 @@ class GnnActorCritic(ActorCriticPolicy):
         own = self.network.state_dict()
         with torch.no_grad():
             for name, tensor in given.state_dict().items():
-                own[name][: len(tensor)].copy_(tensor)
+                own[name][: len(tensor)].copy_(tensor)  # a value's row, the last, stays as drawn
 
     def _robots(
         self, obs: dict[str, Tensor], owner: Int[Tensor, "R"], is_valued: Bool[Tensor, "R N"]
@@ -189,9 +192,11 @@ class GnnActorCritic(ActorCriticPolicy):
         num_nodes = obs["may_address"].shape[-1]
         own = torch.eye(num_nodes, dtype=torch.bool, device=obs["may_address"].device)
         if "owner" in obs:
+            # Each environment is a robot.
             owner = obs["owner"].long()
             logits, values = self._robots(obs, owner.squeeze(1), own[owner.squeeze(1)])
             return logits, values.gather(1, owner).squeeze(1)
+        # Each environment is a team, of which padded robots count for nothing.
         shape = obs["may_address"].shape[:2]
         is_robot = obs["is_robot"].bool()
         counted = is_robot[:, :, None] & is_robot[:, None, :]

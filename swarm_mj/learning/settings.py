@@ -22,9 +22,11 @@ from swarm_mj.system.fields import check, check_value, common_setting, setting
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
 LEARNED_COSTS = (AOI, VELOCITY_VARIANCE)  # that a run can lower
-# First seeds of the missions of evaluations, of those that choose a policy, and of those that tell
-# its cost. Training and environments draw from 2^40 on.
-HELD_OUT_SEED, CHOICE_SEED, TEST_SEED = 500_000, 510_000, 520_000
+# First seeds of missions, apart from each other: the missions that chose a policy would flatter its
+# cost. Training and environments draw from 2^40 on.
+HELD_OUT_SEED = 500_000  # of evaluations during training
+CHOICE_SEED = 510_000  # of those that choose a policy
+TEST_SEED = 520_000  # of those that tell its cost
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
 MAX_DECISIONS = 10**12
@@ -139,7 +141,7 @@ class Training:
     Args:
         credit_assignment: "robot", each paid for what its own packets changed, or "team", one
             reward for all.
-        mission: What is flown, but for the team's size.
+        mission: What is flown, except for the team's size.
         robots: Sizes of the team, from 2 to 200; several are trained on together.
         features: What the network sees of each teammate: the name of a feature set, or
             `module:Name`.
@@ -189,7 +191,7 @@ class Training:
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
     silence_logit: float = setting(
         7.0,
-        "added to the logit of silence, but in a robot's own turn",
+        "added to the logit of silence, except in a robot's own turn",
         low=-100.0,
         high=100.0,
     )
@@ -277,13 +279,17 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
     # III-C, or the authors' code: other features, and two numbers per node. Both have the code's
     # edges. Over the text's, which lead from children to parents, nothing of the robot itself
     # reaches a teammate's node: its recipient could depend neither on where it is nor on the time.
-    features, num_outputs = ("reference", 2) if is_reference else ("paper", 1)
-    inputs = num_features(features)
+    features = "reference" if is_reference else "paper"
+    network = GnnShape(
+        num_features=num_features(features),
+        num_outputs=2 if is_reference else 1,
+        edges="reference",
+    )
     return replace(
         usual,
         credit_assignment="team",
         features=features,
-        network=GnnShape(num_features=inputs, num_outputs=num_outputs, edges="reference"),
+        network=network,
         shares_trunk=False,
         silence_logit=0.0 if is_reference else EVEN_SILENCE,
         ppo=REFERENCE_TEAM_PPO if is_reference else PAPER_TEAM_PPO,

@@ -1,7 +1,7 @@
 """The record of a flight for its replay: one mission's windows as plain arrays."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from numbers import Integral
 from typing import Any, NamedTuple
@@ -115,6 +115,14 @@ class _Row(NamedTuple):
     velocity_variance_m2ps2: Float[np.ndarray, "*T"]
 
 
+def _stacked(rows: Sequence[_Row]) -> _Row:
+    """Return the rows of all windows as one, of arrays with the windows' axis first."""
+    arrays = {}
+    for name in _Row._fields:
+        arrays[name] = np.stack([getattr(row, name) for row in rows])
+    return _Row(**arrays)
+
+
 class _Compared(NamedTuple):
     """The part from snapshots of the radio, of which free space has none."""
 
@@ -145,39 +153,51 @@ class Recorder:
 
     def add(self, flown: WindowRecord | None = None) -> None:
         """Record the window that was just flown, if any, with its costs, if they are known."""
+        if len(self._rows) % self._stride == 0:
+            self._add_age_matrix()
+        if len(self._rows) % self._radio_stride == 0:
+            snapshot = links.radio_snapshot(self._swarm, self._index)
+            if snapshot is not None:
+                self._snapshots.append(snapshot)
+        age_mean = np.nan
+        velocity_variance = np.nan
+        if flown is not None:
+            age_mean = flown.costs.age_windows[self._index]
+            velocity_variance = flown.costs.velocity_variance_m2ps2[self._index]
+            if flown.costs.task_cost is not None:
+                self._task_costs.append(flown.costs.task_cost)
+        row = self._row(age_mean, velocity_variance)
+        # It comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
+        self._rows.append(row)
+
+    def _add_age_matrix(self) -> None:
+        timestamp = self._swarm.buffers.timestamp[self._index]
+        some = timestamp[np.ix_(self._in_matrix, self._in_matrix)]
+        age = self._swarm.now[self._index] - some
+        self._age.append(age.astype(np.float32))  # half the memory; the picture has 256 shades
+
+    def _row(self, age_mean: float, velocity_variance_m2ps2: float) -> _Row:
+        """Return the window as the swarm has it now, with costs that only its record knows."""
         swarm = self._swarm
         index = self._index
         own = self._ego
         buffers = swarm.buffers
         states = swarm.states
-        now = swarm.now[index]
         timestamp = buffers.timestamp[index]
         robots = np.arange(len(timestamp))
-        is_on = np.ones(len(robots), bool) if states.is_active is None else states.is_active[index]
-        age_std, age_max = _age_spread(timestamp, now, is_on)
-        if len(self._rows) % self._stride == 0:
-            some = timestamp[np.ix_(self._in_matrix, self._in_matrix)]
-            self._age.append((now - some).astype(np.float32))
-        if len(self._rows) % self._radio_stride == 0:
-            snapshot = links.radio_snapshot(swarm, index)
-            if snapshot is not None:
-                self._snapshots.append(snapshot)
-        ego_age = now - timestamp[own]
-        is_known = (timestamp[own] > NEVER) | buffers.is_granted[index]
-        age_mean = np.nan
-        velocity_variance = np.nan
-        if flown is not None:
-            age_mean = flown.costs.age_windows[index]
-            velocity_variance = flown.costs.velocity_variance_m2ps2[index]
-            if flown.costs.task_cost is not None:
-                self._task_costs.append(flown.costs.task_cost)
         recipient = [robots, robots]  # silence, of a mission that has not begun
         heard = [robots, robots]
         if swarm.phases:
             recipient = [phase.recipient[index] for phase in swarm.phases]
             heard = [phase.heard[index] for phase in swarm.phases]
+        is_on = np.ones(len(robots), dtype=np.bool_)  # without failures nobody is off
+        if states.is_active is not None:
+            is_on = states.is_active[index]
+        age_std, age_max = _age_spread(timestamp, swarm.now[index], is_on)
+        ego_age = swarm.now[index] - timestamp[own]
+        is_known = (timestamp[own] > NEVER) | buffers.is_granted[index]
         # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
-        row = _Row(
+        return _Row(
             position_m=np.array(states.position_m[index]),
             velocity_mps=np.array(states.velocity_mps[index]),
             recipient=np.array(recipient),
@@ -190,10 +210,8 @@ class Recorder:
             age_mean=np.array(age_mean),
             age_std=np.array(age_std),
             age_max=np.array(age_max),
-            velocity_variance_m2ps2=np.array(velocity_variance),
+            velocity_variance_m2ps2=np.array(velocity_variance_m2ps2),
         )
-        # It comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
-        self._rows.append(row)
 
     @property
     def num_bytes(self) -> int:
@@ -207,7 +225,7 @@ class Recorder:
         """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
         if not self._rows:
             raise ValueError("a replay needs at least 1 window flown, not 0")
-        flown = _Row(*map(np.stack, zip(*self._rows, strict=True)))
+        flown = _stacked(self._rows)
         compared = self._compared(flown.is_on)
         window = np.arange(1, len(self._rows) + 1)
         age_window = window[:: self._stride]
@@ -250,7 +268,7 @@ class Recorder:
     def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K M M"]) -> Facts:
         return Facts(
             mission=self._swarm.mission,
-            policy=config.get("policy") or "",
+            policy=config.get("policy", ""),  # nothing names that of a picture, or of a training
             seed=config.get("seed", 0),
             observer=self._ego,
             is_broadcast=self._swarm.is_broadcast,

@@ -119,8 +119,10 @@ def filling(
     for y in y_low + (np.arange(num) + 0.5) * (y_high - y_low) / num:
         xs = []  # where the outline's edges cross this height: outlines are convex, so twice
         for (x_a, y_a), (x_b, y_b) in itertools.pairwise(outline_m.tolist()):
+            # Half open, so that a corner counts for one of its edges only.
             if min(y_a, y_b) <= y < max(y_a, y_b):
-                xs.append(x_a + (y - y_a) / (y_b - y_a) * (x_b - x_a))
+                share = (y - y_a) / (y_b - y_a)
+                xs.append(x_a + share * (x_b - x_a))
         lines.append(((min(xs), y), (max(xs), y)))
     return lines
 
@@ -147,65 +149,77 @@ def static_geoms(model: MjModel) -> dict[str, list[rr.AsComponents]]:
 
 
 def _drawn(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.AsComponents:
-    quaternion = np.empty(4)
-    mju_mat2Quat(quaternion, data.geom_xmat[g])
-    turns = [rr.Quaternion(xyzw=np.roll(quaternion, -1))]
-    colours = [_colour(model, g)]
+    """Return a geom in the shape that rerun has for its kind, or else as the box around it."""
     kind = model.geom_type[g]
-    size = model.geom_size[g]
-    place = data.geom_xpos[g]
-    rotation = data.geom_xmat[g].reshape(3, 3)
-    middle, half = np.split(model.geom_aabb[g], 2)
+    size_m = model.geom_size[g]
+    place_m = data.geom_xpos[g]
+    rotation = data.geom_xmat[g].reshape(3, 3)  # its third column is the geom's own upward axis
+    upward = rotation[:, 2]
+    # The box around it, in the geom's own axes: a mesh's need not be centred on its place.
+    middle_m, half_m = np.split(model.geom_aabb[g], 2)
+    turns = [_quaternion(data, g)]
+    colours = [_colour(model, g)]
     if kind in (SPHERE, ELLIPSOID):
         return rr.Ellipsoids3D(
-            half_sizes=[half],
-            centers=[place],
+            half_sizes=[half_m],
+            centers=[place_m],
             quaternions=turns,
             colors=colours,
             fill_mode=fill_mode,
         )
     if kind == CYLINDER:
+        radius_m, half_length_m, _ = size_m
         return rr.Cylinders3D(
-            radii=[size[0]],
-            lengths=[2.0 * size[1]],
-            centers=[place],
+            radii=[radius_m],
+            lengths=[2.0 * half_length_m],
+            centers=[place_m],
             quaternions=turns,
             colors=colours,
             fill_mode=fill_mode,
         )
     if kind == CAPSULE:
         # Rerun's capsule begins at its place, MuJoCo's has its middle there.
+        radius_m, half_length_m, _ = size_m
         return rr.Capsules3D(
-            radii=[size[0]],
-            lengths=[2.0 * size[1]],
-            translations=[place - size[1] * rotation[:, 2]],
+            radii=[radius_m],
+            lengths=[2.0 * half_length_m],
+            translations=[place_m - half_length_m * upward],
             quaternions=turns,
             colors=colours,
             fill_mode=fill_mode,
         )
-    if kind == PLANE:  # a plate whose upper face is the plane; sizes of 0 are without end
-        half = np.append(np.where(size[:2] > 0.0, size[:2], FAR_M), FLOOR_M)
-        centre = place - FLOOR_M * rotation[:, 2]
-    else:
-        centre = place + rotation @ middle
+    centre_m = place_m + rotation @ middle_m
+    if kind == PLANE:  # a plate whose upper face is the plane
+        half_x_m, half_y_m, _ = size_m
+        # A size of 0 means without end.
+        half_m = np.array([half_x_m or FAR_M, half_y_m or FAR_M, FLOOR_M])
+        centre_m = place_m - FLOOR_M * upward
     return rr.Boxes3D(
-        half_sizes=[half],
-        centers=[centre],
+        half_sizes=[half_m],
+        centers=[centre_m],
         quaternions=turns,
         colors=colours,
         fill_mode=fill_mode,
     )
 
 
+def _quaternion(data: MjData, g: int) -> rr.Quaternion:
+    wxyz = np.empty(4)
+    mju_mat2Quat(wxyz, data.geom_xmat[g])
+    return rr.Quaternion(xyzw=np.roll(wxyz, -1))  # MuJoCo writes w first, rerun last
+
+
 def _colour(model: MjModel, g: int) -> UInt8[np.ndarray, "3"]:
+    """Return a geom's own colour, or its material's: of a texture the mean, as rerun has none."""
     material = int(model.geom_matid[g])
     if material < 0:
         return (255.0 * model.geom_rgba[g, :3]).astype(np.uint8)
     rgb = np.array(model.mat_rgba[material, :3])
     texture = int(model.mat_texid[material, mjtTextureRole.mjTEXROLE_RGB.value])
     if texture >= 0 and model.tex_nchannel[texture] == 3:
+        # All textures' bytes lie in one array, one after the other.
         start = int(model.tex_adr[texture])
-        size = 3 * int(model.tex_width[texture] * model.tex_height[texture])
-        pixels = model.tex_data[start : start + size].reshape(-1, 3)
+        num_pixels = int(model.tex_width[texture] * model.tex_height[texture])
+        pixels = model.tex_data[start : start + 3 * num_pixels].reshape(-1, 3)
         rgb = rgb * np.mean(pixels, axis=0) / 255.0
     return (255.0 * rgb).astype(np.uint8)

@@ -28,7 +28,6 @@ from swarm_mj.policies.stored import (
     save_gnn,
     save_weights,
 )
-from swarm_mj.system.packages import asset
 
 MISSION = paper("stationary", num_robots=3)
 SEEN = {"num_robots": 3, "features": "paper", "num_features": 8}
@@ -189,13 +188,6 @@ def test_one_feature_more_is_refused_by_its_name_and_not_by_a_number(policy, mon
 def test_a_plain_network_keeps_the_names_of_its_features_too(plain, monkeypatch):
     monkeypatch.setattr(PaperFeatures, "names", PaperFeatures.names[::-1])
     refused(plain, 'other paper features: number 1 of them was "is oneself" and is "L" now')
-
-
-def test_the_shipped_policy_names_its_features():
-    said = json.loads(metadata_of(asset("policies/gnn.safetensors"))["swarm_mj policy"])
-    assert tuple(said["feature_names"]) == FEATURES_OF_1_0["extended"]
-    policy = load_policy(asset("policies/gnn.safetensors"), MISSION)
-    assert policy.parameters["digest"] == "44a1592c564a"  # that of 1.0.0
 
 
 def test_a_gnn_is_loaded_without_torch_until_it_flies(policy):

@@ -31,6 +31,7 @@ def edges_to(
 ) -> WantedEdges:
     """Return the edges between nodes and parents, in each direction; a parent of -1 is none."""
     num_graphs, num_nodes = parent.shape
+    # Room for as many as there can be; the rest is cut off at the end.
     max_edges = parent.size * len(is_upward)
     end = np.empty(max_edges, np.int64)
     start = np.empty(max_edges, np.int64)
@@ -45,13 +46,20 @@ def edges_to(
             num_wanted += is_wanted[r, k]
         for child in range(num_nodes):
             above = parent[r, child]
-            for d in range(len(is_upward) if above >= 0 else 0):
-                to, other = (above, child) if is_upward[d] else (child, above)
-                if place[to] >= 0:
-                    end[num] = place[to]
-                    start[num] = r * num_nodes + other
+            if above < 0:
+                continue
+            for d in range(len(is_upward)):
+                receiver = child
+                sender = above
+                if is_upward[d]:
+                    receiver = above
+                    sender = child
+                if place[receiver] >= 0:
+                    end[num] = place[receiver]
+                    # All nodes send, wanted or not, so senders keep their places among all.
+                    start[num] = r * num_nodes + sender
                     direction[num] = d
-                    degree[place[to]] += 1
+                    degree[place[receiver]] += 1
                     num += 1
     return WantedEdges(end[:num], start[:num], direction[:num], degree)
 
@@ -74,18 +82,29 @@ class EdgeMeans(torch.autograd.Function):
         total = torch.zeros_like(receiver)
         _sum(as_array(receiver), as_array(sender), as_array(direction), edges, total.numpy())
         ctx.save_for_backward(receiver, sender, direction)
-        ctx.edges = edges
-        degree = torch.from_numpy(edges.degree).clamp(min=1)
+        ctx.edges = edges  # `save_for_backward` takes tensors only
+        degree = torch.from_numpy(edges.degree).clamp(min=1)  # a node without edges divides 0 by 1
         ctx.share = degree.to(total.dtype).reciprocal()[:, None]  # of an edge in its end's mean
         return total.mul_(ctx.share)
 
     @staticmethod
     def backward(ctx: Any, *gradients: Tensor) -> tuple[Tensor | None, ...]:  # noqa: ANN401 - torch's own
         """Return the gradients of the first three arguments, from that of the means."""
-        given = tuple(map(as_array, ctx.saved_tensors))
-        back = tuple(map(np.zeros_like, given))
-        _spread(given, ctx.edges, as_array(gradients[0] * ctx.share), back)
-        return *map(torch.from_numpy, back), None
+        receiver, sender, direction = ctx.saved_tensors
+        of_receiver = torch.zeros_like(receiver)
+        of_sender = torch.zeros_like(sender)
+        of_direction = torch.zeros_like(direction)
+        _spread(
+            receiver=as_array(receiver),
+            sender=as_array(sender),
+            direction=as_array(direction),
+            edges=ctx.edges,
+            gradient=as_array(gradients[0] * ctx.share),
+            of_receiver=of_receiver.numpy(),
+            of_sender=of_sender.numpy(),
+            of_direction=of_direction.numpy(),
+        )
+        return of_receiver, of_sender, of_direction, None
 
 
 def as_array(tensor: Tensor) -> np.ndarray:
@@ -102,15 +121,21 @@ def _sum(receiver: Rows, sender: Rows, direction: Rows, edges: WantedEdges, tota
 
 @compiled()
 def _spread(
-    given: tuple[Rows, ...], edges: WantedEdges, gradient: Rows, gradients: tuple[Rows, ...]
+    receiver: Rows,
+    sender: Rows,
+    direction: Rows,
+    edges: WantedEdges,
+    gradient: Rows,
+    of_receiver: Rows,
+    of_sender: Rows,
+    of_direction: Rows,
 ) -> None:
-    receiver, sender, direction = given
-    of_receiver, of_sender, of_direction = gradients
+    """Add each edge's part of the gradient to those of its two ends and of its direction."""
     back = np.empty_like(direction[0])
     for to, start, d in zip(edges.end, edges.start, edges.direction):  # noqa: B905 - not compiled
         for c in range(len(back)):
             edge = receiver[to, c] + sender[start, c] + direction[d, c]
-            back[c] = gradient[to, c] if edge > 0 else ZERO
+            back[c] = gradient[to, c] if edge > 0 else ZERO  # as of a ReLU
         # One array at a time: loops over few arrays are compiled to vectors.
         _add(of_receiver[to], back)
         _add(of_sender[start], back)

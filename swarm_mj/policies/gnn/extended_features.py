@@ -5,6 +5,7 @@ From its own buffer, the packets it sent and decoded, its identity, the team's s
 
 import math
 from dataclasses import replace
+from itertools import compress
 from typing import Annotated, ClassVar
 
 import numpy as np
@@ -104,7 +105,7 @@ class ExtendedFeatures(FeatureExtractor):
             range_m=range_m,
             node=node,
         )
-        has_joined = node["has_joined"]
+        has_joined = node["has_joined"]  # a view, which is written in place
         threshold = from_db(self._mission.sinr_threshold_db)
         write_joined(buffers.position_m, is_known, window, range_m, threshold, has_joined)
         rows = (len(window) * num_robots, num_robots)
@@ -119,9 +120,7 @@ class ExtendedFeatures(FeatureExtractor):
 class LocalFeatures(ExtendedFeatures):
     """The extended features without whose turn it is: nothing that a common order grants."""
 
-    names: ClassVar[tuple[str, ...]] = tuple(
-        name for name, is_local in zip(ExtendedFeatures.names, IS_LOCAL, strict=True) if is_local
-    )
+    names: ClassVar[tuple[str, ...]] = tuple(compress(ExtendedFeatures.names, IS_LOCAL))
     uses: ClassVar[str] = "its buffer, and the packets it sent and received"
 
     def graphs(self, views: LocalViews) -> Graphs:
@@ -157,24 +156,27 @@ def _write_ages_and_news(
             known_share = num_known / num_robots
             for k in range(num_robots):
                 of_k: ExtendedNode = node[b, i, k]
-                of_k.timestamp_age = log_age(now[b], own[k], is_observed[b, i, k])
-                of_k.heard_age = log_age(now[b], memory.heard[b, i, k])
-                of_k.attempt_age = log_age(now[b], last_attempt[b, i, k])
-                of_k.addressed_age = log_age(now[b], memory.addressed_by[b, i, k])
-                ranges = math.sqrt(squared_distance(believed_m[b, i], k, i)) / range_m
                 is_known = k == i or is_observed[b, i, k]
+                ranges = math.sqrt(squared_distance(believed_m[b, i], k, i)) / range_m
+                # One of unknown position may be near, so it may be addressed.
                 may_address[b, i, k] = not is_known or ranges <= ADDRESS_RANGES
                 of_k.is_oneself = k == i
                 of_k.is_known = is_known
-                of_k.known_share = known_share
-                of_k.team_size = num_robots / TEAM
-                of_k.turn_rank = rank[k]
+                of_k.timestamp_age = log_age(now[b], own[k], is_observed[b, i, k])
                 of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
                 of_k.is_near = is_known and k != i and ranges <= 1.0
+                of_k.heard_age = log_age(now[b], memory.heard[b, i, k])
+                of_k.attempt_age = log_age(now[b], last_attempt[b, i, k])
+                of_k.addressed_age = log_age(now[b], memory.addressed_by[b, i, k])
+                of_k.turn_rank = rank[k]
+                of_k.known_share = known_share
+                of_k.team_size = num_robots / TEAM
+                # Who is out of range cannot be reached, so there is no news to it.
                 of_k.news = 0.0
                 of_k.unsaid_news = 0.0
                 if of_k.is_near > 0.0:
                     of_k.news, of_k.unsaid_news = _rises(own, memory.neighbour[b, i, k], said)
+                    # Sums first and logarithms then: what is said to all adds up in windows.
                     news += of_k.news
                     unsaid_news += of_k.unsaid_news
                     of_k.news = logarithm(of_k.news)
@@ -217,6 +219,7 @@ def _write_beliefs(
     for b in range(num_missions):
         for i in range(num_robots):
             its = node[b, i]
+            # Of a team at rest most robots believe the same: no need to count all of it again.
             if believes_as_the_last(believed_m[b], is_known[b], i):
                 last = node[b, i - 1]
                 for k in range(num_robots):
@@ -235,17 +238,28 @@ def _write_beliefs(
                 known_y_m[num_known] = y_m[k]
                 num_known += is_known[b, i, k]  # else the next one takes its place
             for k in range(num_robots):
-                count = 0
-                for n in range(num_known if is_known[b, i, k] else 0):
-                    dx = known_x_m[n] - x_m[k]
-                    dy = known_y_m[n] - y_m[k]
-                    count += 1 if dx * dx + dy * dy <= range_m * range_m else 0
                 of_each: ExtendedNode = its[k]
-                of_each.neighbours = max(count - 1, 0) / CROWD  # for it finds itself
+                of_each.neighbours = 0.0
+                if is_known[b, i, k]:
+                    num_near = count_near(
+                        known_x_m[:num_known], known_y_m[:num_known], x_m[k], y_m[k], range_m
+                    )
+                    of_each.neighbours = (num_near - 1) / CROWD  # for it finds itself
             whom = is_known[b, i]
             write_turns(x_m, y_m, whom, window[b], 1.5 * range_m, its["has_turn_1_5"], is_close)
             write_turns(x_m, y_m, whom, window[b], 2.0 * range_m, its["has_turn_2"], is_close)
             write_turns(x_m, y_m, whom, window[b], 3.0 * range_m, its["has_turn_3"], is_close)
+
+
+@compiled()
+def count_near(x_m: Column, y_m: Column, from_x_m: float, from_y_m: float, radius_m: float) -> int:
+    """Return how many of some places are within a radius of one."""
+    num_near = 0
+    for n in range(len(x_m)):
+        dx = x_m[n] - from_x_m
+        dy = y_m[n] - from_y_m
+        num_near += dx * dx + dy * dy <= radius_m * radius_m
+    return num_near
 
 
 @compiled()
@@ -271,8 +285,7 @@ def write_turns(
     is_close[:] = 0.0
     half_round = (window + num_robots // 2) % num_robots
     for place in range(num_robots + 1):
-        k = window % num_robots if place == 0 else half_round + place - 1
-        k -= num_robots if k >= num_robots else 0
+        k = window % num_robots if place == 0 else (half_round + place - 1) % num_robots
         if not is_known[k]:
             break
         if is_close[k] == 0.0 and has_turn[k] == 0.0:
@@ -280,4 +293,5 @@ def write_turns(
             for j in range(num_robots):
                 dx = x_m[j] - x_m[k]
                 dy = y_m[j] - y_m[k]
+                # Written each time: a choice whether to write would keep the loop from vectors.
                 is_close[j] = 1.0 if dx * dx + dy * dy < radius_m * radius_m else is_close[j]

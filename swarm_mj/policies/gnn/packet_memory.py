@@ -56,9 +56,21 @@ def remember(memory: Memory, views: LocalViews) -> None:
     """Take in the window of transmission and response that has just ended; must see every one."""
     if views.phases:
         transmission, response = views.phases
-        half_way = views.now - SLOT_WINDOWS
-        _take_in(memory, transmission.recipient, transmission.heard, half_way, True)
-        _take_in(memory, response.recipient, response.heard, views.now, False)
+        _take_in(
+            memory=memory,
+            recipient=transmission.recipient,
+            heard=transmission.heard,
+            time=views.now - SLOT_WINDOWS,
+            is_transmission=True,
+        )
+        _take_in(
+            memory=memory,
+            recipient=response.recipient,
+            heard=response.heard,
+            time=views.now,
+            is_transmission=False,
+        )
+    # They were followed above for what packets carried; how the window ended is in the buffers.
     memory.timestamp[...] = views.buffers.timestamp
 
 
@@ -72,12 +84,16 @@ def _take_in(
 ) -> None:
     for b in range(len(time)):
         observe_own(memory.timestamp[b], time[b])
+        # Packets leave all at once, so none holds what another one just brought.
         packet = memory.timestamp[b].copy()
         for i, k in enumerate(heard[b]):
+            # An answer does not count as speaking first.
             if is_transmission and recipient[b, i] != i:
-                memory.sent[b, i], memory.said[b, i] = time[b], packet[i]
+                memory.sent[b, i] = time[b]
+                memory.said[b, i] = packet[i]
             if k != i:
-                memory.heard[b, i, k], memory.neighbour[b, i, k] = time[b], packet[k]
+                memory.heard[b, i, k] = time[b]
+                memory.neighbour[b, i, k] = packet[k]
                 if recipient[b, k] == i:
                     memory.addressed_by[b, i, k] = time[b]
         merge_timestamps(packet, heard[b], memory.timestamp[b])
@@ -107,4 +123,6 @@ def log_age(now: float, then: float, is_granted: bool = False) -> float:
     if not (then > NEVER or is_granted) or age >= LONG_WINDOWS:
         return 1.0
     place = int(SLOTS_PER_WINDOW * age)
-    return LOG_AGES[place] if place == SLOTS_PER_WINDOW * age and place >= 0 else logarithm(age)
+    if place == SLOTS_PER_WINDOW * age and place >= 0:
+        return LOG_AGES[place]
+    return logarithm(age)

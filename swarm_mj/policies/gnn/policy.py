@@ -48,7 +48,7 @@ class GnnPolicy(LearnedPolicy):
             network: Torch's own as it is, live, on any device: later changes of its weights count.
                 One that was stored becomes torch's when it flies first.
             extractor: It makes the features, of the mission that is flown.
-            silence_logit: Added to silence, but in a robot's own turn.
+            silence_logit: Added to silence, except in a robot's own turn.
             is_deterministic: Whether robots take the most probable recipient instead of a draw.
             own_features: The name of the features, as `module:Name`, if they are a user's own.
         """

@@ -1,0 +1,46 @@
+"""The record of the features of version 1.0.0: it is as it was, and what files of then need."""
+
+import hashlib
+import json
+from typing import cast
+
+import pytest
+from safetensors import safe_open
+
+from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
+from swarm_mj.system.packages import asset
+
+
+def test_the_record_is_as_it_was():
+    """It must never change, not even together with the code."""
+    assert list(FEATURES_OF_1_0) == ["paper", "reference", "buffer", "local", "extended"]
+    digest = hashlib.sha256(json.dumps(dict(FEATURES_OF_1_0)).encode()).hexdigest()
+    assert digest[:16] == "fd34286eaf2ba0b6"
+
+
+def test_the_record_cannot_be_changed_while_a_program_runs():
+    record = cast(dict[str, tuple[str, ...]], FEATURES_OF_1_0)
+    with pytest.raises(TypeError):
+        record["extended"] = ()
+    assert all(type(names) is tuple for names in FEATURES_OF_1_0.values())
+
+
+def test_the_shipped_policy_which_is_of_then_stores_the_names_on_record():
+    """It was trained before files named their features; the first layer has a column for each."""
+    with safe_open(asset("policies/gnn.safetensors"), "numpy") as file:
+        said = json.loads(file.metadata()["swarm_mj policy"])
+        first_layer = file.get_tensor("encoder.node.0.weight")
+    assert tuple(said["feature_names"]) == FEATURES_OF_1_0["extended"]
+    assert first_layer.shape[1] == len(FEATURES_OF_1_0["extended"])
+
+
+def test_local_features_were_the_extended_ones_but_for_turns():
+    extended = FEATURES_OF_1_0["extended"]
+    no_turns = tuple(name for name in extended if "turn" not in name)
+    assert FEATURES_OF_1_0["local"] == no_turns
+
+
+@pytest.mark.parametrize("features", FEATURES_OF_1_0)
+def test_no_name_stands_twice_in_a_set(features):
+    names = FEATURES_OF_1_0[features]
+    assert len(set(names)) == len(names)
