@@ -8,7 +8,7 @@ from swarm_mj.system.fields import did_you_mean
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
 class FlightSummary(dict[str, Any]):
-    """What one flight cost, by the names and in the order of `swarm-mj fly --json`.
+    """The costs of one flight, by the names and in the order of `swarm-mj fly --json`.
 
     Each number is an attribute. It is a key as well, so `summary["aoi_mean"]`, `dict(summary)` and
     `json.dumps(summary)` do what they do with a dictionary. Counts of packets are totals, and None

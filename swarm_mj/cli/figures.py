@@ -91,7 +91,7 @@ def _draw(
     for method in options.policy:
         check_choice("policy", method, methods)
     drawn: dict[str, Figure] = {}
-    # The flock flies a mission, so it comes last: what is refused is told before the wait.
+    # The flock flies a mission, so it comes last: the others are refused before that wait.
     for name in sorted(options.figure, key=lambda name: name == FLOCK):
         status.update(f"Drawing {name} ...")
         try:

@@ -39,7 +39,7 @@ WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
 @dataclass(frozen=True, kw_only=True)
 class _Metadata:
-    """What the metadata's entry says, but for its format and version."""
+    """The entry of the metadata, without its format and version."""
 
     kind: Literal["gnn", "mlp"]
     config: dict[str, Any]

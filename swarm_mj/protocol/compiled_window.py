@@ -20,7 +20,7 @@ from swarm_mj.system.compiled import compiled
 
 
 class _Known(NamedTuple):
-    """What robots know of each other: the arrays of `Buffers` that a window writes."""
+    """The arrays of `Buffers` that a window writes: all that robots know of each other."""
 
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     believed_m: Float[np.ndarray, "B N N 2"]  # of M^{i,j}: the buffers' `position_m`

@@ -33,7 +33,7 @@ class Packets(NamedTuple):
 
 
 class SlotCounts(NamedTuple):
-    """What is counted of the packets of one slot in one mission, before they have fates."""
+    """Counts of the packets of one slot in one mission, before they have fates."""
 
     sent: int
     delivered: int  # decoded by their recipient

@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from swarm_mj.system.interrupt import answer_interrupt
 from swarm_mj.system.processes import PYTHON, running
 
 if TYPE_CHECKING:  # what draws is slow to import
@@ -65,6 +66,7 @@ def run(command: list[str]) -> int:
         with running(command, environment=quiet_environment()) as viewer:
             return int(viewer.wait() != 0)  # its own codes, or a signal's, mean nothing here
     except KeyboardInterrupt:
+        answer_interrupt()
         return 0
 
 

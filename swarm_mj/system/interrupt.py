@@ -49,6 +49,11 @@ def raise_if_interrupted() -> None:
         raise KeyboardInterrupt
 
 
+def answer_interrupt() -> None:
+    """Take Ctrl-C as answered: it was the way to end this work, which is not broken off by it."""
+    _pressed[0] = False
+
+
 @contextmanager
 def deferred_interrupt() -> Iterator[Callable[[], bool]]:
     """Only note the first Ctrl-C within it; a second one interrupts at once, as ever.

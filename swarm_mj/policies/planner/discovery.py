@@ -15,7 +15,7 @@ from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 
 
 class Purpose(Enum):
-    """What a slot is for."""
+    """The purpose of a slot."""
 
     DISCOVERY = auto()  # robots that may not know each other yet take turns
     SEARCH = auto()  # for robots that were not heard from for long

@@ -130,7 +130,7 @@ class Evidence:
         """Note the next slot; robots whose notes are full count on only the kinds they have."""
         j = np.flatnonzero(kinds != NOTHING)
         times = self._times[j, kinds[j]]
-        # Packets have room for so many kinds; a new one is left out when a robot has them all.
+        # Packets have room for MAX_KINDS kinds: a robot that has them all notes no other.
         has_room = np.count_nonzero(self._times[j], axis=1) < MAX_KINDS
         is_noted = np.where(times == 0, has_room, times < MAX_TIMES)
         self._times[j, kinds[j]] += is_noted

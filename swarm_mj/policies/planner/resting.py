@@ -172,7 +172,7 @@ class RestingPlanner(BroadcastPolicy):
 
 
 class _Basis(NamedTuple):
-    """What a plan follows from: robots for which both are equal follow the same one."""
+    """The grounds of a plan: robots for which both are equal follow the same one."""
 
     positions: bytes  # all of them, as the robot holds them
     owner: int | None  # of the table of links; None: links are as believed
