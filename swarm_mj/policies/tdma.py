@@ -61,6 +61,10 @@ class Tdma(BroadcastPolicy):
 
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return the one robot whose slot it is."""
+        return self.owns_slot(views)
+
+    def owns_slot(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Return the one robot whose slot it is, whatever anyone believes."""
         place = slot_of(views.now) % views.num_robots
         owner = self._order[np.arange(len(place)), place]
         return views.silence == owner[:, None]

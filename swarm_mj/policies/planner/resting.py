@@ -37,6 +37,7 @@ from swarm_mj.policies.about import (
     VariantOf,
 )
 from swarm_mj.policies.planner import link_tables
+from swarm_mj.policies.planner.assent import Assent, turns_every
 from swarm_mj.policies.planner.epochs import SnapshotTeam
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import PlannerSettings
@@ -158,9 +159,10 @@ class RestingPlanner(BroadcastPolicy):
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by the schedule it knows or in its turn."""
         transmits = self._turns.transmits(views)
+        owns_slot = self._turns.owns_slot(views)
         each = team_views(views)
         for b, team in enumerate(self._teams):
-            transmits[b] = team.transmits(each[b], transmits[b])
+            transmits[b] = team.transmits(each[b], transmits[b], owns_slot[b])
         if self._heeds_motion:
             knows_motion = np.any(views.buffers.velocity_mps, axis=(2, 3))
             # Once a team has moved its epochs go on, also while all of its robots rest again.
@@ -210,13 +212,17 @@ class _Team:
         self._flights: dict[_Basis, _Flight] = {}
         self._followed: list[_Followed] = []  # in the slot before
         self._transmitted = np.zeros(num_robots, dtype=bool)  # likewise
+        self._assent = Assent(num_robots, settings)
+        self._turns_every = turns_every(num_robots, settings)
         self._joined = np.full(num_robots, NOT_YET)  # the slot since when i follows plans
         self._evidence = link_tables.Evidence(num_robots)
         self._current: link_tables.Tables | None = None
         self._current_begin = 0  # the slot since when robots fly by these tables
         self._next: link_tables.Tables | None = None
 
-    def transmits(self, view: TeamView, in_turn: Bool[np.ndarray, "N"]) -> Bool[np.ndarray, "N"]:
+    def transmits(
+        self, view: TeamView, in_turn: Bool[np.ndarray, "N"], owns_slot: Bool[np.ndarray, "N"]
+    ) -> Bool[np.ndarray, "N"]:
         """Return who transmits in this slot: by its plan or, if it cannot plan, in turn.
 
         Every slot is asked for once, in order.
@@ -228,19 +234,30 @@ class _Team:
         knows_all = np.all(view.is_known, axis=1)
         knows_motion = np.any(view.velocity_mps, axis=(1, 2))
         can_plan = knows_all & ~knows_motion
-        if self._learns and slot > 0:
-            self._learn(slot, view.heard, _known_until(view, self._first_slot))
-            self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
+        plans = can_plan
+        if self._learns:
+            known_until = _known_until(view, self._first_slot)
+            if slot > 0:
+                self._learn(slot, view.heard, known_until)
+                self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
+            serves_all = self._assent.tell(slot, can_plan, known_until)
+        else:
+            serves_all = np.zeros_like(can_plan)
+        is_for_turns = now % self._turns_every == 0
+        if is_for_turns:
+            plans = can_plan & serves_all
+            in_turn = np.where(can_plan, owns_slot, in_turn)
         self._followed = []
         transmits = in_turn.copy()
-        for basis, robots in self._groups(view, can_plan).items():
+        for basis, robots in self._groups(view, plans).items():
             if basis not in self._flights:
                 self._flights[basis] = self._flight(view.position_m[robots[0]], basis.owner)
             flight = self._flights[basis]
             planned = flight.plan.transmits(slot - flight.begin)
             transmits[robots] = planned[robots]
             follows = np.isin(self._everyone, robots)
-            self._followed.append(_Followed(follows, flight, planned))
+            if not is_for_turns:
+                self._followed.append(_Followed(follows, flight, planned))
         self._transmitted = transmits
         return transmits
 
@@ -276,7 +293,7 @@ class _Team:
     ) -> None:
         """Note what packets were decoded or missed in the slot before, by who can tell."""
         # A robot that has been silent for a round may be gone, and is not waited for.
-        is_silent = known_until < slot - self._round
+        is_silent = known_until < slot - round(self._settings.gone_rounds * self._round)
         # Whether all others follow plans, as far as j knows: else j cannot say who transmitted.
         is_joined = self._joined[None, :] <= known_until
         knows_all_plan = np.all(is_silent | is_joined, axis=1)
