@@ -29,6 +29,7 @@ SHORT = PlannerSettings(
     spread_rounds=0.5,
     min_round_windows=8,
     min_log_odds=1.0,
+    min_planned_robots=2,
 )
 
 
@@ -49,6 +50,7 @@ class Told(NamedTuple):
     slot: int  # in which it said so; it knew what it noted in the slots before
     follows: bool  # whether it had begun to follow plans before
     notes: frozenset  # how often it noted (sender, bin, whether decoded)
+    assents: bool  # whether it had heard of all lately, one slot before
 
 
 class Table(NamedTuple):
@@ -80,9 +82,11 @@ class LearningMind:
     me: int
     mission: object
     settings: PlannerSettings
+    learns: bool
     told: dict[int, Told] = field(default_factory=dict)  # the youngest, of every robot
     notes: Counter = field(default_factory=Counter)
     follows: bool = False
+    assents: bool = False
     flown: Table | None = None
     upcoming: Table | None = None
     heard: int | None = None  # whom it decoded in the slot before
@@ -108,20 +112,46 @@ class LearningMind:
         if packet.upcoming is not None and packet.upcoming.rank < self.upcoming.rank:
             self.upcoming = packet.upcoming
 
-    def transmits(self, row, slot, in_turn):
+    def transmits(self, row, slot, in_turn, owns_slot):
         """Whether it does in the slot that begins now."""
         seen, position_m, velocity_mps = row
         if slot > 0:
             self.note(slot - 1)
             self.keep_time(slot)
-        self.told[self.me] = Told(slot, self.follows, frozenset(self.notes.items()))
+        self.told[self.me] = Told(slot, self.follows, frozenset(self.notes.items()), self.assents)
         self.plan, self.transmitted = None, in_turn
-        if all(seen > 0.0) and not velocity_mps.any():
+        can_plan = all(seen > 0.0) and not velocity_mps.any()
+        self.assents = can_plan and self.hears_of_all(slot)
+        is_for_turns = slot % self.turns_every == 0
+        if can_plan:
             self.follows = True
-            self.plan = self.plan_for(position_m, slot)
-            begin, transmits = self.plan[:2]
+        if can_plan and is_for_turns and not (self.learns and self.knows_that_all_assent()):
+            self.transmitted = owns_slot
+        elif can_plan:
+            begin, transmits, *beliefs = self.plan_for(position_m, slot)
             self.transmitted = bool(transmits[slot - begin, self.me])
+            if not is_for_turns:
+                self.plan = (begin, transmits, *beliefs)
         return self.transmitted
+
+    @property
+    def turns_every(self):
+        """The least number from a quarter of the team's, that has no divisor in common with it."""
+        num_robots = self.mission.num_robots
+        every = max(self.settings.min_turns_every, round(num_robots / 4))
+        while any(every % k == num_robots % k == 0 for k in range(2, every + 1)):
+            every += 1
+        return every
+
+    def hears_of_all(self, slot):
+        """Whether what it was told of each of the others is at most two rounds of N windows old."""
+        others = [told for i, told in self.told.items() if i != self.me]
+        return all(slot - told.slot + 1 <= 4 * self.mission.num_robots for told in others)
+
+    def knows_that_all_assent(self):
+        """Whether all said lately that they hear of all, and it does as well."""
+        others = [told for i, told in self.told.items() if i != self.me]
+        return self.assents and all(told.assents for told in others)
 
     @property
     def num_slots(self):
@@ -176,8 +206,8 @@ class LearningMind:
 
     def note(self, slot):
         """What it decoded or missed in a slot of which it knows who transmitted."""
-        # Whoever told nothing younger for a round is not waited for.
-        least = slot + 2 - 2 * max(self.mission.num_robots, self.settings.min_round_windows)
+        # Whoever told nothing younger for three rounds is not waited for.
+        least = slot + 2 - 6 * max(self.mission.num_robots, self.settings.min_round_windows)
         knows_all = len(self.told) == self.mission.num_robots and all(
             told.follows or told.slot < least for told in self.told.values()
         )
@@ -207,10 +237,10 @@ class LearnedApart(Flight):
 
     def __init__(self, mission, seed, *, channel=None, settings=SHORT, learns=True):
         self.learns, self.turns = learns, make_policy("spatial-tdma", mission)
-        plain = make_policy("planner --payload none", mission)
+        plain = RestingPlanner(mission, settings)
         policy = learner(mission, settings) if learns else plain
         minds = [
-            LearningMind(me=i, mission=mission, settings=settings)
+            LearningMind(me=i, mission=mission, settings=settings, learns=learns)
             for i in range(mission.num_robots)
         ]
         super().__init__(policy, mission, seed, channel=channel, minds=minds)
@@ -221,6 +251,7 @@ class LearnedApart(Flight):
 
     def transmits(self, views):
         self.in_turn = self.turns.transmits(views)[0]
+        self.owns_slot = self.turns.owns_slot(views)[0]
         return super().transmits(views)
 
     def asked(self, mind, views, slot):
@@ -229,7 +260,8 @@ class LearnedApart(Flight):
             for i, t in enumerate(row[0].tolist()):
                 told = mind.told.get(i)
                 assert t == (0.0 if told is None else (told.slot + 1) / 2)
-        return mind.transmits(row, slot, bool(self.in_turn[mind.me]))
+        in_turn, owns_slot = bool(self.in_turn[mind.me]), bool(self.owns_slot[mind.me])
+        return mind.transmits(row, slot, in_turn, owns_slot)
 
     def converse(self, heard):
         if self.learns:

@@ -310,6 +310,7 @@ def link_fields(mission: Mission) -> tuple[PacketField, ...]:
     in_table = {"bits": 8, "count": num_links, "step": STEP_DB, "unit": "dB"}
     return (
         PacketField(name="slot since which each robot plans", bits=16, count=num_robots),
+        PacketField(name="whether each robot hears of all", bits=1, count=num_robots),
         times(identity("sender of a kind of packet", mission), num_noted),
         PacketField(name="its margin", bits=bits_for(NUM_BINS), count=num_noted),
         PacketField(name="whether it was decoded", bits=1, count=num_noted),

@@ -60,8 +60,11 @@ class Planner(BroadcastPolicy):
     def for_mission(cls, mission: Mission) -> BroadcastPolicy:
         """Return the planner of a team that moves, or of one at rest.
 
-        At rest, packets carry what robots learn of links wherever a slot holds that.
+        At rest, packets carry what robots learn of links wherever a slot holds that. Tiny teams
+        take turns, with the paper's packets.
         """
+        if mission.num_robots < PlannerSettings().min_planned_robots:
+            return RestingPlanner(mission)
         if mission.moves:
             return cls(mission)
         packet = packet_of(mission, link_fields(mission))

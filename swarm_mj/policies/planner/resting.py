@@ -43,7 +43,7 @@ from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
-from swarm_mj.policies.tdma import SpatialTdma
+from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.protocol.packets import PacketField, fits, packet_of
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.protocol.window import LocalViews
@@ -92,7 +92,9 @@ WITH_LINKS = About(
 class RestingPlanner(BroadcastPolicy):
     """Robots make one plan when they know where all rest.
 
-    Until then they take turns, as in spatial TDMA. With a payload they learn their links, too.
+    Until then they take turns, as in spatial TDMA. With a payload they learn their links, too, and
+    tell each other who hears of all; while someone does not, turns have a share of the slots
+    (`assent.py`). Teams of up to 6 take turns only, where plans gain little and may fail.
     """
 
     about = Listed(
@@ -125,11 +127,13 @@ class RestingPlanner(BroadcastPolicy):
         self._mission = mission
         self._belief = Belief(radio=radio_of(mission))
         self._settings = settings or PlannerSettings()
-        self._learns = learns
-        self._turns = SpatialTdma(mission)
+        # Tiny teams take turns, whatever they know.
+        self._plans = mission.num_robots >= self._settings.min_planned_robots
+        self._learns = learns and self._plans
+        self._turns = SpatialTdma(mission) if self._plans else Tdma()
         has_room = fits(packet_of(mission, snapshot_fields(mission)), mission)
-        self._heeds_motion = learns and has_room
-        if learns:
+        self._heeds_motion = self._learns and has_room
+        if self._learns:
             self.about = WITH_LINKS
             self.payload = WITH_LINKS.payload_name
 
@@ -159,6 +163,8 @@ class RestingPlanner(BroadcastPolicy):
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
         """Return who transmits, by the schedule it knows or in its turn."""
         transmits = self._turns.transmits(views)
+        if not self._plans:
+            return transmits
         owns_slot = self._turns.owns_slot(views)
         each = team_views(views)
         for b, team in enumerate(self._teams):
@@ -226,6 +232,11 @@ class _Team:
         """Return who transmits in this slot: by its plan or, if it cannot plan, in turn.
 
         Every slot is asked for once, in order.
+
+        Args:
+            view: What each robot knows.
+            in_turn: Who transmits by spatial TDMA.
+            owns_slot: Whose slot it is by TDMA: one robot.
         """
         now = round(view.now / SLOT_WINDOWS)
         if self._first_slot is None:
@@ -234,28 +245,30 @@ class _Team:
         knows_all = np.all(view.is_known, axis=1)
         knows_motion = np.any(view.velocity_mps, axis=(1, 2))
         can_plan = knows_all & ~knows_motion
-        plans = can_plan
+        serves_all = np.zeros_like(can_plan)  # without a payload nobody can tell
         if self._learns:
             known_until = _known_until(view, self._first_slot)
             if slot > 0:
                 self._learn(slot, view.heard, known_until)
                 self._joined[can_plan] = np.minimum(self._joined[can_plan], slot)
             serves_all = self._assent.tell(slot, can_plan, known_until)
-        else:
-            serves_all = np.zeros_like(can_plan)
         is_for_turns = now % self._turns_every == 0
         if is_for_turns:
-            plans = can_plan & serves_all
+            # Turns without those who join them: they would join by what they believe of links.
             in_turn = np.where(can_plan, owns_slot, in_turn)
+            follows_plan = can_plan & serves_all
+        else:
+            follows_plan = can_plan
         self._followed = []
         transmits = in_turn.copy()
-        for basis, robots in self._groups(view, plans).items():
+        for basis, robots in self._groups(view, follows_plan).items():
             if basis not in self._flights:
                 self._flights[basis] = self._flight(view.position_m[robots[0]], basis.owner)
             flight = self._flights[basis]
             planned = flight.plan.transmits(slot - flight.begin)
             transmits[robots] = planned[robots]
             follows = np.isin(self._everyone, robots)
+            # Of slots for turns nobody can say who follows its plan there, so they teach nothing.
             if not is_for_turns:
                 self._followed.append(_Followed(follows, flight, planned))
         self._transmitted = transmits
@@ -292,7 +305,7 @@ class _Team:
         self, slot: int, heard: Int[np.ndarray, "N"], known_until: Int[np.ndarray, "N N"]
     ) -> None:
         """Note what packets were decoded or missed in the slot before, by who can tell."""
-        # A robot that has been silent for a round may be gone, and is not waited for.
+        # A robot that has been silent for so long may be gone, and is not waited for.
         is_silent = known_until < slot - round(self._settings.gone_rounds * self._round)
         # Whether all others follow plans, as far as j knows: else j cannot say who transmitted.
         is_joined = self._joined[None, :] <= known_until

@@ -65,12 +65,12 @@ class PlannerSettings:
     drawn_share: float = 0.5  # of the standard deviation of their positions that is drawn [1]
     slack_hops: float = 0.25  # by which a path may exceed the shortest, and still is one [hops]
 
-    # Turns beside the plans of teams at rest, so that no plan fails for ever; chosen on missions
-    # with seeds from 910000.
-    min_planned_robots: int = 7  # smaller teams take turns: plans gain nothing there [robots]
+    # Turns of teams at rest beside their plans (`assent.py`), chosen on 12 missions of 300 windows
+    # and seeds from 910000, of 7 to 12 robots at rest: noise, clocks, failures, walls and fades.
+    min_planned_robots: int = 7  # fewer take turns only: with 6 a plan gains a tenth [robots]
     overdue_rounds: float = 2.0  # a robot not heard of for longer is overdue; N windows are one
-    min_turns_every: int = 3  # while someone is overdue, one slot in so many is for turns ...
-    turns_every_robots: float = 0.25  # ... or in so many for each robot
+    min_turns_every: int = 3  # at most one slot in so many belongs to the turns [slots]
+    turns_every_robots: float = 0.25  # and about one in so many for each robot [slots]
 
     # Tables of links in teams at rest, chosen on four missions of 240 to 300 windows, with seeds
     # from 70000, under shadowing of 6 dB and in the arena `blocks`.
