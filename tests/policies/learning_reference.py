@@ -138,7 +138,7 @@ class LearningMind:
     def turns_every(self):
         """The least number from a quarter of the team's, that has no divisor in common with it."""
         num_robots = self.mission.num_robots
-        every = max(self.settings.min_turns_every, round(num_robots / 4))
+        every = max(3 if self.learns else 8, round(num_robots / 4))
         while any(every % k == num_robots % k == 0 for k in range(2, every + 1)):
             every += 1
         return every

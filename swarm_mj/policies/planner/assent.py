@@ -49,9 +49,13 @@ class Assent:
         return np.all(told & is_fresh & (slot >= since), axis=1)
 
 
-def turns_every(num_robots: int, settings: PlannerSettings) -> int:
-    """Return every how many slots one belongs to the turns, whose number is that of the robots."""
-    every = max(settings.min_turns_every, round(settings.turns_every_robots * num_robots))
+def turns_every(num_robots: int, settings: PlannerSettings, *, learns: bool) -> int:
+    """Return every how many slots one belongs to the turns, of which there is one of each robot.
+
+    Without a payload nobody can know that the turns are not needed, so they are rarer.
+    """
+    least = settings.min_turns_every if learns else settings.min_turns_every_untold
+    every = max(least, round(settings.turns_every_robots * num_robots))
     while math.gcd(every, num_robots) > 1:
         every += 1
     return every

@@ -219,7 +219,7 @@ class _Team:
         self._followed: list[_Followed] = []  # in the slot before
         self._transmitted = np.zeros(num_robots, dtype=bool)  # likewise
         self._assent = Assent(num_robots, settings)
-        self._turns_every = turns_every(num_robots, settings)
+        self._turns_every = turns_every(num_robots, settings, learns=learns)
         self._joined = np.full(num_robots, NOT_YET)  # the slot since when i follows plans
         self._evidence = link_tables.Evidence(num_robots)
         self._current: link_tables.Tables | None = None

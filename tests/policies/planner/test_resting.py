@@ -39,13 +39,15 @@ def test_eq9_late_robots_join_the_plan_of_the_others(robot, missing):
     apart.fly(15)
     assert np.all(apart.swarm.buffers.is_known)
     plan = only_plan(apart.policy)
-    np.testing.assert_array_equal(apart.fly(10), [plan.transmits(slot) for slot in range(60, 80)])
+    for slot, transmit in enumerate(apart.fly(10), 60):
+        if slot % 11 != 0:  # which is for turns
+            np.testing.assert_array_equal(transmit, plan.transmits(slot))
 
 
 @pytest.mark.parametrize("seed", range(3))
 def test_a_team_at_rest_flies_one_plan_and_it_comes_true(seed):
-    """T is what the plan expects, as soon as all that is older is replaced."""
-    swarm, policy = Swarm(REST, [seed]), make_policy(NAME, REST)
+    """T is what the plan expects, as soon as all that is older is replaced, and all know that."""
+    swarm, policy = Swarm(REST, [seed]), make_policy("planner", REST)
     swarm.start(policy)
     flown = transmitters(swarm, policy, 60)
     plan = only_plan(policy)
@@ -92,18 +94,22 @@ def test_eq10_a_plan_from_buffers_is_younger_than_turns():
     """Of 12 robots at rest, over 80 windows: each of two missions."""
     mission = paper("stationary", num_robots=12, range_ratio=0.2)
     planned, *others = (mean_ages(mission, name) for name in (NAME, "spatial-tdma", "tdma"))
-    assert np.all(planned < 0.8 * np.minimum(*others))
+    assert np.all(planned < 0.85 * np.minimum(*others))
 
 
 def test_a_new_start_forgets_and_the_clock_counts_from_there():
-    """After 30 windows of another policy, all know all: the plan is flown from its first slot."""
+    """After 30 windows of another policy, all know all: the plan is flown from its first slot, but
+    for slots that are for turns."""
     swarm, policy = Swarm(REST, [1]), make_policy(NAME, REST)
     tdma = make_policy("tdma", REST)
     swarm.start(tdma)
     transmitters(swarm, tdma, 30)
     flown = transmitters(swarm, policy, 10)
     plan = only_plan(policy)
-    np.testing.assert_array_equal(flown[:, 0], [plan.transmits(slot) for slot in range(20)])
+    is_planned = np.arange(60, 80) % 9 != 0
+    planned = np.array([plan.transmits(slot) for slot in range(20)])
+    np.testing.assert_array_equal(flown[is_planned, 0], planned[is_planned])
+    np.testing.assert_array_equal(np.sum(flown[~is_planned, 0], axis=1), 1)
     policy.start(10, [np.random.default_rng(0)])
     assert not policy._teams[0]._flights
 
@@ -123,7 +129,7 @@ def test_a_team_that_should_rest_but_moves_plans_as_teams_that_move():
 
 @pytest.mark.parametrize(
     ("num_bytes", "num_robots", "payload"),
-    [(10_618, 40, "links"), (10_617, 40, "none"), (140_000, 200, "links")],
+    [(10_623, 40, "links"), (10_622, 40, "none"), (140_000, 200, "links")],
 )
 def test_teams_at_rest_learn_if_slots_hold_it_to_the_byte(num_bytes, num_robots, payload):
     """Else they fly as without a payload. Of 200 robots, what is learned of links takes 117 kB or
@@ -132,7 +138,7 @@ def test_teams_at_rest_learn_if_slots_hold_it_to_the_byte(num_bytes, num_robots,
     policy = make_policy("planner", mission)
     assert policy.payload == payload
     if num_robots == 40:
-        assert policy.packet(mission).num_bytes == (10_618 if payload == "links" else 367)
+        assert policy.packet(mission).num_bytes == (10_623 if payload == "links" else 367)
 
 
 CHANNELS = {
@@ -180,7 +186,7 @@ def test_a_robot_that_missed_the_best_table_flies_by_the_best_it_has():
     owners = [mind.flown.rank[1] for mind in apart.minds]
     assert owners[3] == 3
     assert 3 not in owners[:3] + owners[4:]
-    apart.fly(3)
+    apart.fly(6)
     assert apart.minds[3].took_over >= 1
     assert apart.minds[3].flown.rank[1] in owners[:3] + owners[4:]
 
@@ -206,3 +212,37 @@ def test_eq10_learning_pays_under_shadowing():
         age[name] = np.mean(windows[40:], axis=0)
     assert np.all(age["learns"] < age["does not"])
     assert np.mean(age["learns"]) < 0.85 * np.mean(age["does not"])
+
+
+@pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
+@pytest.mark.parametrize("num_robots", [2, 3, 6])
+def test_tiny_teams_take_turns_and_send_the_paper_s_packets(task, num_robots):
+    mission = paper(task, num_robots=num_robots)
+    for name in ("planner", NAME):
+        policy = make_policy(name, mission)
+        assert policy.payload == "none"
+        np.testing.assert_array_equal(
+            flown(mission, policy, [4, 5], 40),
+            flown(mission, make_policy("tdma", mission), [4, 5], 40),
+        )
+
+
+@pytest.mark.parametrize(
+    ("num_robots", "channel", "seed"),
+    [
+        (8, {"shadowing_db": 6.0}, 910_002),
+        (8, {"position_noise_m": 20.0}, 910_006),
+        (7, {"arena": "rooms"}, 910_001),
+    ],
+)
+def test_a_plan_on_links_that_do_not_work_starves_nobody(num_robots, channel, seed):
+    """The oldest news is of some rounds of turns; it was of 100 windows and more by plans alone."""
+    mission = paper("stationary", num_robots=num_robots, num_windows=200, **channel)
+    swarm = Swarm(mission, [seed])
+    policy = make_policy("planner", mission)
+    oldest = 0.0
+    for window in range(200):
+        swarm.step(policy)
+        if window >= 50:
+            oldest = max(oldest, np.max(swarm.now[0] - swarm.buffers.timestamp[0]))
+    assert oldest < 8.0 * num_robots
