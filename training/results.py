@@ -142,7 +142,7 @@ def measure_deciding(settings: Settings) -> int:
     """Time this machine, and the policies' decisions; return the exit code."""
     path, out = settings.folder / "bench.json", settings.folder / "deciding.csv"
     few = ["--missions", "1", "--seconds", "0.1", "--no-learning"] if settings.is_smoke else []
-    code = swarm_mj(["bench", "--episodes", "0", *few, "--json", str(path)])
+    code = swarm_mj(["bench", "--episodes", "0", *few, "--json", str(path), "--force"])
     if code == DONE:
         found = read_json(read_file(path, "bench", MAX_BYTES), dict)
         [table] = [each for each in found["tables"] if each["title"].startswith("Time to decide")]

@@ -7,7 +7,7 @@ from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import missions_of
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, MAX_REGIMES, Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
@@ -40,6 +40,7 @@ class StudyOptions(StudyFlags):
         help="a study to run, FILE.toml or a shipped one's name; or two results to compare, each "
         "written by --parquet",
         metavar="FILE",
+        reads=lambda name: [Path(name)],
         is_positional=True,
     )
 
@@ -106,6 +107,11 @@ def _study(tables: dict[str, Any]) -> Study:
             regimes += missions_of(placed, called=str)
         except ValueError as error:
             raise ValueError(f"{place}: {error}") from error
+        if len(regimes) > MAX_REGIMES:  # tables may be many, too: stop before all are read
+            raise ValueError(
+                f"the tables have more than {MAX_REGIMES} missions, the most allowed; fly them in "
+                "several studies"
+            )
     return Study(**own, regimes=tuple(dict.fromkeys(regimes)))
 
 
