@@ -120,6 +120,28 @@ def test_what_no_study_may_say_is_refused_in_a_line_that_names_the_file(refusal,
     assert REFUSED[text] in line
 
 
+NINE = [0.01 * n for n in range(1, 10)]
+LOSSES = ("erasure", "burst_begin", "burst_end", "range_ratio", "velocity_ratio", "shadowing_db")
+
+
+def test_lists_that_multiply_to_too_many_missions_are_refused_before_one_is_made(read, monkeypatch):
+    """Seven lists of nine values neither ended nor were refused."""
+    monkeypatch.setattr("swarm_mj.cli.mission_options.make_mission", None)
+    lists = "".join(f"{name} = {NINE}\n" for name in LOSSES)
+    rule = (
+        r"multiply to 531441 missions \(9 of range_ratio x .*\), and up to 10000 are allowed; give"
+    )
+    with pytest.raises(ValueError, match=rf"s\.toml: \[mission\]: .* {rule} fewer values"):
+        read(f"[mission]\n{lists}")
+
+
+def test_tables_of_too_many_missions_are_refused(read, monkeypatch):
+    monkeypatch.setattr("swarm_mj.cli.study.MAX_REGIMES", 4)
+    assert len(read("[missions.a]\nnum_robots = [2, 3, 4, 5]\n").regimes) == 4
+    with pytest.raises(ValueError, match="more than 4 missions, the most allowed"):
+        read("[missions.a]\nnum_robots = [2, 3, 4]\n[missions.b]\nnum_robots = [5, 6]\n")
+
+
 @pytest.mark.parametrize(
     ("line", "complaint"),
     [
