@@ -72,7 +72,7 @@ def opengl():
         pytest.skip(str(error))
 
 
-TRAPPED = ("mujoco", "multiprocessing", "numpy", "pickle", "rerun_cli", "swarm_mj")
+TRAPPED = ("ctypes", "mujoco", "multiprocessing", "numpy", "pickle", "rerun_cli", "swarm_mj")
 
 
 @pytest.fixture

@@ -17,7 +17,7 @@ import numpy as np
 from swarm_mj.cli import script
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.read import read_footage
-from swarm_mj.system.fields import setting
+from swarm_mj.system.fields import files_read, setting, the_file
 from swarm_mj.system.writing import Output, check_outputs, write_text
 
 
@@ -25,7 +25,9 @@ from swarm_mj.system.writing import Output, check_outputs, write_text
 class Options:
     """What is read, and what is written."""
 
-    replay: Path = setting(help="an .rrd file that `swarm-mj fly` recorded", is_positional=True)
+    replay: Path = setting(
+        help="an .rrd file that `swarm-mj fly` recorded", is_positional=True, reads=the_file
+    )
     out: Path = setting(Path("mission.tcl"), "the trace, or the table", metavar="FILE.tcl|.csv")
     force: bool = setting(False, "replace an existing file")
 
@@ -33,7 +35,7 @@ class Options:
 def run(options: Options) -> int:
     """Write the movements; return the exit code."""
     output = Output("file", options.out, ".tcl|.csv")
-    check_outputs(output, inputs=[options.replay], must_be_new=not options.force)
+    check_outputs(output, inputs=files_read(options), must_be_new=not options.force)
     lines = (as_table if options.out.suffix.lower() == ".csv" else as_trace)(
         read_footage(options.replay)
     )

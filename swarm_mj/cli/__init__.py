@@ -145,9 +145,10 @@ def _exit_code(name: str, work: Callable[[], int]) -> int:
 def _outcome(work: Callable[[], int], was_interrupted: Callable[[], bool]) -> tuple[int, str]:
     """Return the exit code of some work, and the line to print of an error."""
     try:
+        from swarm_mj.system.processes import safe_children
         from swarm_mj.system.user_code import one_line_each
 
-        with one_line_each():
+        with one_line_each(), safe_children():
             code = work()
         raise_if_interrupted()  # work loads modules, too
         return code, ""

@@ -58,6 +58,7 @@ class BenchOptions:
         metavar="FILE.json",
     )
     plot: Path | None = output_option(None, "draw these teams", metavar="FILE.png|.svg|.pdf")
+    force: bool = output_option(False, "replace existing files")
 
 
 class Measured(NamedTuple):
@@ -73,7 +74,7 @@ def run(options: BenchOptions) -> int:
     if options.plot:
         need("matplotlib", "a chart")
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
-    check_outputs(Output("--json", options.json, ".json"), chart)
+    check_outputs(Output("--json", options.json, ".json"), chart, must_be_new=not options.force)
     if options.plot or options.robots:
         _check_teams(set(options.robots))
     tell_cores(options.jobs if options.episodes else 1)

@@ -14,7 +14,7 @@ from swarm_mj.learning.selection import REFERENCES, Row, column
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
-from swarm_mj.system.fields import setting
+from swarm_mj.system.fields import files_read, setting
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
@@ -31,6 +31,11 @@ class Learned:
     rows: list[Row]  # its evaluations, at least one
 
 
+def _files_of_run(folder: Path) -> list[Path]:
+    """Return what is read of a run; a figure may well stand beside it, in its folder."""
+    return [folder / SETTINGS, folder / CURVE]
+
+
 @dataclass(frozen=True, kw_only=True)
 class CurvesOptions:
     """The options of `swarm-mj curves`."""
@@ -39,6 +44,7 @@ class CurvesOptions:
         help="folders that `swarm-mj train` wrote; those that differ only in their seed are a line",
         metavar="RUN",
         is_positional=True,
+        reads=_files_of_run,
     )
     plot: Path | None = setting(None, "draw the curves", metavar="FILE.png|.svg|.pdf")
     force: bool = setting(False, "replace an existing figure")
@@ -46,7 +52,11 @@ class CurvesOptions:
 
 def run(options: CurvesOptions) -> int:
     """Run the command; return its exit code."""
-    check_outputs(Output("--plot", options.plot, ".png|.svg|.pdf"), must_be_new=not options.force)
+    check_outputs(
+        Output("--plot", options.plot, ".png|.svg|.pdf"),
+        inputs=files_read(options),
+        must_be_new=not options.force,
+    )
     runs = [_read(folder) for folder in dict.fromkeys(options.run)]
     missions = _missions(runs[0].asked.training)
     for each in runs:

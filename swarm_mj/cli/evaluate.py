@@ -25,7 +25,7 @@ from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
-from swarm_mj.system.fields import common_setting, same_as
+from swarm_mj.system.fields import common_setting, files_read, same_as
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.packages import need
@@ -70,7 +70,9 @@ class StudyFlags(EngineOptions):
 class EvaluateOptions(StudyFlags, PolicyOptions):
     """The options of `swarm-mj evaluate`."""
 
-    policy: tuple[str, ...] = common_setting(DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}")
+    policy: tuple[str, ...] = common_setting(
+        DEFAULT_POLICIES, f"{NAMES}, all of these, {OTHERS}", reads=registry.files_of
+    )
     episodes: int = same_as(Study, "episodes")
     seed: int = same_as(Study, "seed")
     baseline: str | None = same_as(Study, "baseline")
@@ -108,7 +110,8 @@ def run_study(options: StudyFlags, study: Study) -> int:
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
     if options.plot:
         need("matplotlib", "a chart")
-    inputs = registry.stored_policies(study.policies)
+    # A study that is a file names more of them than the options.
+    inputs = [*files_read(options), *files_read(study)]
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
     way_out = "choose fewer --jobs, --robots, --windows or --episodes"
     needs = study_needs(study, options.jobs_here)

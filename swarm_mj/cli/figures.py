@@ -11,8 +11,8 @@ from rich.status import Status as StatusLine
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
 from swarm_mj.evaluation.results import Result, read_results
-from swarm_mj.policies.registry import stored_policies
-from swarm_mj.system.fields import GONE_IN, check_choice, setting
+from swarm_mj.policies.registry import files_of
+from swarm_mj.system.fields import GONE_IN, check_choice, files_read, setting, the_file
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 
@@ -30,6 +30,7 @@ class FiguresOptions:
         help="files of one preset that `swarm-mj evaluate --csv` wrote",
         metavar="RESULTS.csv",
         is_positional=True,
+        reads=the_file,
     )
     out: Path = setting(help="where to write", metavar="DIR")
     figure: tuple[str, ...] = setting(
@@ -44,7 +45,9 @@ class FiguresOptions:
     )
     force: bool = setting(False, "replace existing figures")
     yes: bool = setting(False, f"ignored: drawing needs little memory; removed in {GONE_IN}")
-    flock_policy: str = setting("mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS)
+    flock_policy: str = setting(
+        "mst", "who talks to whom in it", metavar="POLICY", group=FLOCKS, reads=files_of
+    )
     flock_seed: int = setting(1, "its seed", group=FLOCKS)
 
 
@@ -116,7 +119,7 @@ def _paths(options: FiguresOptions) -> dict[str, list[Path]]:
         outputs += [Output("figure", path) for path in its]
     check_outputs(
         *outputs,
-        inputs=(*options.results, *stored_policies([options.flock_policy])),
+        inputs=files_read(options),
         must_be_new=not options.force,
     )
     return paths

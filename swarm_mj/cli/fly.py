@@ -20,7 +20,7 @@ from swarm_mj.policies import registry
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.replay import view
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import common_setting
+from swarm_mj.system.fields import common_setting, files_read
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import is_installed, missing, need
@@ -41,7 +41,9 @@ class FlyOptions(PolicyOptions):
         "recorded)."
     )
     policy: str = common_setting(
-        "planner", f"{NAMES}, a learned policy's directory or file, or module:Name of your own"
+        "planner",
+        f"{NAMES}, a learned policy's directory or file, or module:Name of your own",
+        reads=registry.files_of,
     )
     seed: int = common_setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
@@ -152,7 +154,7 @@ def _replay_path(options: FlyOptions) -> Path | None:
     check_outputs(
         replay,
         Output("--json", options.json, ".json"),
-        inputs=registry.stored_policies([options.policy]),
+        inputs=files_read(options),
         must_be_new=not options.force,
     )
     if options.view and replay.path:

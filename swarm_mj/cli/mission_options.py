@@ -1,18 +1,21 @@
 """Options that several commands share: those that make missions, and those of policies."""
 
+import math
 import shlex
-from collections.abc import Callable, Collection, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import Field, dataclass, fields, replace
 from functools import partial
 from itertools import product
 from typing import Any
 
 from swarm_mj.cli.options import Option, flags_of, nested
+from swarm_mj.evaluation.study import MAX_REGIMES
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.simulation.components import GROUP, SHOWN_AS, Components
 from swarm_mj.system.fields import Meaning, about_of, as_typed, kind_of, setting
+from swarm_mj.system.user_code import files_named
 
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
@@ -52,6 +55,7 @@ class PolicyOptions(Components):
         "that a learned policy was trained on; give them again",
         group=GROUP,
         metavar=SHOWN_AS,
+        reads=files_named,
     )
 
     @property
@@ -77,6 +81,7 @@ def missions_of(
             value = given[place]
             swept[spec.name] = list(dict.fromkeys(value)) if isinstance(value, tuple) else [value]
     missions: list[Mission] = []
+    _check_number(swept)
     for values in product(*swept.values()):
         named = dict(zip(swept, values, strict=True))
         missions.append(make_mission(**named))
@@ -86,6 +91,20 @@ def missions_of(
             # A fraction that rounds to no robot makes the missions of 0, which are flown once.
             missions[index] = replace(mission, high_power_fraction=0.0)
     return tuple(dict.fromkeys(missions))
+
+
+def _check_number(swept: Mapping[str, Collection[Any]]) -> None:
+    """Raise ValueError for more missions than are made in a while: lists of values multiply."""
+    number = math.prod(map(len, swept.values()))
+    if number > MAX_REGIMES:
+        factors: list[str] = []
+        for name, values in swept.items():
+            if len(values) > 1:
+                factors.append(f"{len(values)} of {name}")
+        raise ValueError(
+            f"the values given multiply to {number} missions ({' x '.join(factors)}), and up to "
+            f"{MAX_REGIMES} are allowed; give fewer values, or fly them one study after another"
+        )
 
 
 def mission_of(given: dict[str, Any]) -> Mission:

@@ -12,11 +12,11 @@ from rich.console import Console
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.replay import view
 from swarm_mj.simulation.components import SHOWN_AS, Components
-from swarm_mj.system.fields import GONE_IN, setting
+from swarm_mj.system.fields import GONE_IN, files_read, setting, the_file
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import WorkBar, plain_console
-from swarm_mj.system.user_code import is_own
+from swarm_mj.system.user_code import files_named, is_own
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 if TYPE_CHECKING:
@@ -33,7 +33,7 @@ class ReplayOptions:
     """The options of `swarm-mj replay`."""
 
     file: tuple[Path, ...] = setting(
-        help=".rrd files that `swarm-mj fly` recorded", is_positional=True
+        help=".rrd files that `swarm-mj fly` recorded", is_positional=True, reads=the_file
     )
     web: bool = setting(
         False, "serve it to a browser, on this machine's loopback address only, until Ctrl-C"
@@ -66,6 +66,7 @@ class ReplayOptions:
         "the scene of your own that the mission was flown in; of a picture, too",
         metavar=SHOWN_AS,
         shown=BARE,
+        reads=files_named,
     )
     force: bool = _video(False, "replace an existing video or picture")
     yes: bool = _video(False, f"ignored: videos need no estimate; removed in {GONE_IN}")
@@ -109,7 +110,7 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
     if others:
         raise ValueError(f"a picture shows 1 replay, not {len(options.file)}; name one")
     written = Output("picture", picture, ".png|.svg|.pdf")
-    check_outputs(written, inputs=options.file, must_be_new=not options.force)
+    check_outputs(written, inputs=files_read(options), must_be_new=not options.force)
     for module in ("matplotlib", "rerun"):
         need(module, "a picture")
     quiet_matplotlib()
@@ -126,7 +127,7 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
 
 def _make_video(options: ReplayOptions, video: Path) -> int:
     written = Output("video", video, ".mp4|.gif")
-    check_outputs(written, inputs=options.file, must_be_new=not options.force)
+    check_outputs(written, inputs=files_read(options), must_be_new=not options.force)
     suffix = video.suffix.lower()
     style = _style(options, suffix)
     for module in ("av", "PIL", "rerun"):

@@ -7,7 +7,7 @@ from pathlib import Path
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.simulation.components import Components
-from swarm_mj.system.fields import same_as, setting
+from swarm_mj.system.fields import files_read, same_as, setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.terminal import plain_console, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_text
@@ -31,7 +31,11 @@ def run(options: SceneOptions) -> int:
 
     raise_if_interrupted()  # before a file is written: what was loaded may have swallowed it
     mission = options.mission
-    check_outputs(Output("scene", options.out, ".xml|.mjcf"), must_be_new=not options.force)
+    check_outputs(
+        Output("scene", options.out, ".xml|.mjcf"),
+        inputs=files_read(options),
+        must_be_new=not options.force,
+    )
     swarm = Swarm(mission, [options.seed], scene=options.scene)
     spec = compose(mission, start=swarm.states, scene=swarm.scene)
     spec.compile()

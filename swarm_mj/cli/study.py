@@ -7,11 +7,11 @@ from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import missions_of
-from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
+from swarm_mj.evaluation.study import DEFAULT_POLICIES, MAX_REGIMES, Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
-from swarm_mj.simulation.components import Components
+from swarm_mj.simulation.components import TABLE, Components
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import check_kind, check_names, did_you_mean, former_names, setting
 from swarm_mj.system.packages import asset, need
@@ -40,7 +40,11 @@ class StudyOptions(StudyFlags):
         help="a study to run, FILE.toml or a shipped one's name; or two results to compare, each "
         "written by --parquet",
         metavar="FILE",
+        reads=lambda name: [Path(name)],
         is_positional=True,
+    )
+    trust: bool = setting(
+        False, "run the code that the study names, as module:Name; look at it before"
     )
 
 
@@ -51,7 +55,7 @@ def run(options: StudyOptions) -> int:
     if len(named) != len(TAKES[action].split()):
         raise ValueError(f"study {action} takes {TAKES[action]}, not {' '.join(named)}")
     if action == "run":
-        return run_study(options, read_study(*named))
+        return run_study(options, read_study(*named, is_trusted=options.trust))
     if options != StudyOptions(action=action, named=named):
         raise ValueError("study compare prints what it finds; leave out the options")
     need("scipy", "a comparison")
@@ -68,14 +72,16 @@ def run(options: StudyOptions) -> int:
     return DONE
 
 
-def read_study(name: str) -> Study:
+def read_study(name: str, *, is_trusted: bool = False) -> Study:
     """Return the study of a TOML file, or a shipped one.
 
     Args:
         name: The file's path, or the name of a shipped study.
+        is_trusted: Whether code that the file names, as `module:Name`, may be run. To make a study
+            is to run it, and a file may come from anyone.
 
     Raises:
-        ValueError: There is no such study, or the file is none.
+        ValueError: There is no such study, the file is none, or names code and is not trusted.
         OSError: The file cannot be read.
     """
     shipped = {each.stem: each for each in asset("studies").glob("*.toml")}
@@ -85,20 +91,33 @@ def read_study(name: str) -> Study:
         raise ValueError(f"a study must be named FILE.toml, not {name}{hint}")
     content = read_file(path, "study", MAX_BYTES)
     try:
-        return _study(tomllib.loads(content.decode()))
+        return _study(tomllib.loads(content.decode()), is_trusted=is_trusted)
+    except RecursionError as error:
+        raise ValueError(f"study {path}: it is nested too deep") from error
     except (ValueError, TypeError) as error:
         raise ValueError(f"study {path}: {error}") from error
 
 
-def _study(tables: dict[str, Any]) -> Study:
+def _study(tables: dict[str, Any], *, is_trusted: bool) -> Study:
     """Return a study from a file's tables; without [missions.NAME], [mission] has its missions."""
     check_names("a study", tables, ("study", "mission", "missions"))
     own = _values("[study]", tables.get("study", {}), Study)
-    own["policies"] = tuple(registry.listed(own.get("policies", DEFAULT_POLICIES)))
-    own["components"] = Components(**own.get("components", {}))
+    policies = own.get("policies", DEFAULT_POLICIES)
+    check_kind("policies", policies, tuple, '["tdma", "mst"]')
+    for policy in policies:
+        check_kind("each policy", policy, str, '"tdma"')
+    own["policies"] = tuple(registry.listed(policies))
+    parts = _values("[study.components]", own.get("components", {}), Components)
+    for kind, part in parts.items():
+        check_kind(f"[study.components] {kind}", part, str, '"my_parts:Mine"')
+    own["components"] = Components(**parts)
+    if not is_trusted:
+        _check_names_no_code(own)
     shared = _values("[mission]", tables.get("mission", {}), Mission)
     regimes: list[Mission] = []
-    for name, table in tables.get("missions", {"": {}}).items():
+    named = tables.get("missions", {"": {}})
+    check_kind("[missions]", named, dict, "tables, [missions.NAME]")
+    for name, table in named.items():
         place = f"[missions.{name}]" if name else "[mission]"
         given = shared | _values(place, table, Mission)
         placed = {f"mission.{field}": value for field, value in given.items()}
@@ -106,7 +125,25 @@ def _study(tables: dict[str, Any]) -> Study:
             regimes += missions_of(placed, called=str)
         except ValueError as error:
             raise ValueError(f"{place}: {error}") from error
+        if len(regimes) > MAX_REGIMES:  # tables may be many, too: stop before all are read
+            raise ValueError(
+                f"the tables have more than {MAX_REGIMES} missions, the most allowed; fly them in "
+                "several studies"
+            )
     return Study(**own, regimes=tuple(dict.fromkeys(regimes)))
+
+
+def _check_names_no_code(own: dict[str, Any]) -> None:
+    """Raise ValueError if a file's table [study] names users' code, which making it would run."""
+    named = [name for name in own["policies"] if registry.is_own_policy(name)]
+    named += [str(name) for name in own.get("features", ())]
+    for name in own["components"].names.values():
+        if not name.startswith(TABLE):
+            named.append(name)
+    if named:
+        raise ValueError(
+            f"it runs someone's own {named[0]:.200}; if you trust that code, give --trust"
+        )
 
 
 def _values(place: str, given: dict[str, Any], kind: type[Any]) -> dict[str, Any]:

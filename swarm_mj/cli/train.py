@@ -17,7 +17,7 @@ from swarm_mj.learning.selection import Progress
 from swarm_mj.learning.settings import Device, Training
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
-from swarm_mj.system.fields import common_setting, same_as, setting
+from swarm_mj.system.fields import common_setting, files_read, same_as, setting, the_file
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
@@ -47,7 +47,9 @@ class TrainOptions:
         choices=get_args(Device),
         shown="auto, --resume: as before",
     )
-    init: Path | None = common_setting(None, "begin with a stored policy", metavar="POLICY")
+    init: Path | None = common_setting(
+        None, "begin with a stored policy", metavar="POLICY", reads=the_file
+    )
     yes: bool = setting(False, YES)
     settings: dict[str, Any] = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()
@@ -93,7 +95,7 @@ def _asked_run(options: TrainOptions) -> TrainingRun:
     run = replace(run, limits=asked_limits(run.limits, options), device=device)
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
     written = (Output("run", options.out / name) for name in names)
-    check_outputs(*written, inputs=[options.init] if options.init else [])
+    check_outputs(*written, inputs=[*files_read(options), *files_read(run.training)])
     needs = run_folder.training_needs(run.training, run.limits)
     check_fits(needs, options.out, "choose fewer --missions or --robots", is_forced=options.yes)
     return run

@@ -24,7 +24,7 @@ from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
 from swarm_mj.system.packages import code_digest, need
-from swarm_mj.system.processes import guard
+from swarm_mj.system.processes import SAFE_PATH, guard
 from swarm_mj.system.user_code import is_users
 
 Work = Callable[[Any], Any]
@@ -34,7 +34,7 @@ Done = Generator[tuple[int, Any]]  # pieces' indices and products
 # look for a window system, which it does by a program that complains if it is left.
 SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS", "MKL", "NUMBA")}
 # Nor does any import modules of the current folder, as `python -c` would.
-SURROUNDINGS |= {"MUJOCO_GL": "disable", "PYTHONSAFEPATH": "1"}
+SURROUNDINGS |= {"MUJOCO_GL": "disable", SAFE_PATH: "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 GROUP: dict[str, Any] = {"group": "processes that fly missions"}

@@ -2,10 +2,11 @@
 
 import json
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any
+from types import NoneType
+from typing import Any, get_args
 
 import numpy as np
 import pandas as pd
@@ -14,6 +15,7 @@ from pyarrow import parquet
 
 from swarm_mj.evaluation.results import Evaluated, config_of
 from swarm_mj.evaluation.samples import bootstrap_interval
+from swarm_mj.evaluation.study import MAX_MISSIONS
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import MISSION_COSTS, MissionCost
 from swarm_mj.simulation.components import CALLED_WITH
@@ -24,6 +26,18 @@ from swarm_mj.system.writing import write_bytes
 KINDS = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
 REGIME = {spec.name: kind_of(spec) for spec in fields(Mission)} | dict.fromkeys(CALLED_WITH, str)
 COSTS = [cost.column for cost in MISSION_COSTS]
+# The types in a file that may stand for a kind: other programs store texts in several ways.
+IS_KIND: dict[object, Callable[[pa.DataType], bool]] = {
+    str: lambda found: pa.types.is_string(found) or pa.types.is_large_string(found),
+    int: pa.types.is_integer,
+    float: lambda found: pa.types.is_floating(found) or pa.types.is_integer(found),
+    bool: pa.types.is_boolean,
+}
+DEFAULTS = {spec.name: spec.default for spec in fields(Mission)}
+OPTIONAL = [spec.name for spec in fields(Mission) if NoneType in get_args(spec.type)]
+MAY_LACK = {*COSTS, *CALLED_WITH, *OPTIONAL}  # the columns that a mission may have no value of
+KEYS = ["policy", *REGIME, "seed"]  # which tell missions apart
+MAX_ROWS = MAX_MISSIONS  # of a file
 COLUMNS = {"policy": str, "seed": int} | dict.fromkeys(COSTS, float) | REGIME
 
 
@@ -65,15 +79,64 @@ def read_missions(path: Path) -> pd.DataFrame:
     """Return the missions of a file that `write_missions` wrote, one a row.
 
     Raises:
-        ValueError: The file is none of these, or cannot be read.
+        ValueError: The file is none of these, is damaged or cannot be read, or has a mission twice.
     """
     with open_file(path, "missions") as file:
         try:
-            found = pd.read_parquet(file)
-        except pa.ArrowInvalid as error:
-            raise ValueError(f"missions {path}: {error}; make them with --parquet") from error
-    newer = {spec.name: spec.default for spec in fields(Mission) if spec.name not in found}
-    return found.assign(**newer)  # in a file without a field, it had its default
+            found = _in_columns(parquet.ParquetFile(file))
+        except (pa.ArrowException, OSError, ValueError) as error:  # each of some kind of damage
+            said = " ".join(str(error).split())
+            raise ValueError(f"missions {path}: {said}; make them with --parquet") from error
+    # What pandas may have written beside the columns, such as an index, is not ours.
+    missions = found.to_pandas(ignore_metadata=True)
+    is_twice = missions.duplicated(KEYS)
+    if is_twice.any():
+        twice = missions[is_twice].iloc[0]
+        raise ValueError(
+            f"missions {path}: the one of policy {twice['policy']} and seed {twice['seed']} is "
+            f"there more than once, as are {is_twice.sum() - 1} others, so none can be told from "
+            "its copies; write the file anew with --parquet"
+        )
+    return missions
+
+
+def _in_columns(file: parquet.ParquetFile) -> pa.Table:
+    """Return a file's missions in the columns that `write_missions` writes, and no others.
+
+    In a file without a newer field of `Mission`, that had its default. Raises ValueError for
+    columns that lack or hold something else.
+    """
+    num_missions = file.metadata.num_rows
+    if not 1 <= num_missions <= MAX_ROWS:
+        raise ValueError(f"a file has from 1 to {MAX_ROWS} missions, not {num_missions}")
+    there = file.schema_arrow.names
+    for name in COLUMNS:
+        if there.count(name) > 1:
+            raise ValueError(f"it has several columns {name}")
+    found = file.read(columns=[name for name in COLUMNS if name in there])
+    columns: list[pa.ChunkedArray] = []
+    for name, kind in COLUMNS.items():
+        if name in there:
+            columns.append(_column(name, kind, found.column(name)))
+        elif name in DEFAULTS:
+            default = pa.array([DEFAULTS[name]] * num_missions, KINDS[kind])
+            columns.append(pa.chunked_array([default]))
+        else:
+            raise ValueError(f"it has no column {name}")
+    return pa.table(columns, names=list(COLUMNS))
+
+
+def _column(name: str, kind: object, found: pa.ChunkedArray) -> pa.ChunkedArray:
+    """Return a column as its declared kind; raise ValueError for one that holds something else."""
+    if found.null_count and name not in MAY_LACK:
+        raise ValueError(f"column {name} lacks {found.null_count} values")
+    is_kind = IS_KIND[kind](found.type) or pa.types.is_null(found.type)
+    if not is_kind:
+        raise ValueError(f"column {name} must hold {KINDS[kind]}, not {found.type!s:.80}")
+    column = found.cast(KINDS[kind])
+    if name in COSTS and np.isinf(column.to_numpy()).any():
+        raise ValueError(f"column {name} holds an infinite number, which has no mean")
+    return column
 
 
 def compared(before: pd.DataFrame, after: pd.DataFrame, cost: MissionCost) -> pd.DataFrame:
@@ -92,7 +155,7 @@ def compared(before: pd.DataFrame, after: pd.DataFrame, cost: MissionCost) -> pd
     # As pandas names columns that both tables have.
     of_before = f"{cost.column}_x"
     of_after = f"{cost.column}_y"
-    both = before.merge(after, "outer", ["policy", *REGIME, "seed"], indicator=True)
+    both = before.merge(after, "outer", KEYS, indicator=True)
     both = both.dropna(subset=[of_before, of_after], how="all")
     varied = ["policy"]
     for name in REGIME:  # those that tell regimes apart

@@ -15,8 +15,11 @@ from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.simulation.components import Components, digest
 from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.packages import code_digest, commit, version
+from swarm_mj.system.user_code import files_named
 
 DEFAULT_POLICIES = ("planner", *BASELINES)
+MAX_REGIMES = 10_000  # each is a `Mission` in memory, with every policy made for it
+MAX_MISSIONS = 10_000_000  # days of flying; the list of their batches is made first
 BATCH_SIZE = 25  # missions side by side: as fast as many, and little lost by an interruption
 
 
@@ -39,13 +42,15 @@ class Study:
         ValueError: There is nothing to evaluate, a policy is unknown, or a number out of range.
     """
 
-    policies: tuple[str, ...]  # names among `POLICIES`, or directories of learned ones
+    # Names among `POLICIES`, or directories of learned ones.
+    policies: tuple[str, ...] = setting(reads=registry.files_of)
     regimes: tuple[Mission, ...]
     episodes: int = common_setting(100, "missions of each policy in each regime", low=1, high=10**5)
     seed: int = common_setting(1000, "seed of the first mission; the others follow one by one")
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
-    features: tuple[str, ...] = ()  # users' own extractors that learned policies may load
+    # Users' own extractors that learned policies may load.
+    features: tuple[str, ...] = setting((), reads=files_named)
     components: Components = setting(Components(), former=("parts",))
     baseline: str | None = common_setting(
         None,
@@ -58,6 +63,7 @@ class Study:
         if not self.policies or not self.regimes:
             raise ValueError("an evaluation needs at least 1 policy and 1 regime")
         check(self)
+        self._check_number()
         if not 0 <= self.seed <= MAX_SEED - self.episodes + 1:
             raise ValueError(
                 f"seed must be from 0 to {MAX_SEED - self.episodes + 1}, the last of "
@@ -78,6 +84,21 @@ class Study:
             raise ValueError(
                 f"baseline must be one of the policies evaluated, {', '.join(self.policies)}, not "
                 f"{self.baseline!r}; add it to them"
+            )
+
+    def _check_number(self) -> None:
+        """Raise ValueError for more work than can be listed, before any of it is."""
+        num_regimes = len(self.regimes)
+        if num_regimes > MAX_REGIMES:
+            raise ValueError(
+                f"a study may have up to {MAX_REGIMES} regimes, not {num_regimes}; fly them in "
+                "several studies"
+            )
+        number = self.episodes * num_regimes * len(self.policies)
+        if number > MAX_MISSIONS:
+            raise ValueError(
+                f"a study may have up to {MAX_MISSIONS} missions, not {number} ({self.episodes} "
+                f"episodes x {num_regimes} regimes x {len(self.policies)} policies); choose fewer"
             )
 
     @property

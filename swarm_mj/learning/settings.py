@@ -18,6 +18,7 @@ from swarm_mj.protocol.mission_costs import (
 )
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check, check_value, common_setting, setting
+from swarm_mj.system.user_code import files_named
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
@@ -185,6 +186,7 @@ class Training:
         "extended",
         f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
         "your own",
+        reads=files_named,
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network

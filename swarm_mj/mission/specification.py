@@ -6,6 +6,7 @@ Where the paper's text and its authors' code differ, each difference is a field 
 
 import math
 from dataclasses import dataclass
+from pathlib import Path
 from typing import Any, Literal, TypedDict, get_args
 
 from swarm_mj.system.fields import (
@@ -38,6 +39,12 @@ OPEN = "open"  # the arena of the paper's missions: nothing stands in it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
 NEW = "not the paper's"  # the source of what the paper has not
+
+
+def _file_of_arena(arena: str) -> list[Path]:
+    """Return the MJCF file that an arena's name is; the names of those in the package are none."""
+    path = Path(arena)
+    return [path] if path.is_file() else []
 
 
 def in_order(prior_knowledge: str) -> str:
@@ -231,6 +238,7 @@ class Mission:
         label="arena",
         source=NEW,
         metavar="NAME",
+        reads=_file_of_arena,
         is_common=True,
     )
 

@@ -25,7 +25,7 @@ from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.system.fields import check_kind, did_you_mean, unwrapped
 from swarm_mj.system.packages import asset, need
-from swarm_mj.system.user_code import is_own, make
+from swarm_mj.system.user_code import files_named, is_own, make
 
 PACKAGE = __name__.rpartition(".")[0]
 # The modules of trained networks are not imported: they need torch or safetensors, which flying
@@ -230,6 +230,13 @@ def is_own_policy(name: str) -> bool:
 def stored_policies(names: Iterable[str]) -> list[Path]:
     """Return the files and folders among policies' names."""
     return [Path(name) for name in names if is_stored(name)]
+
+
+def files_of(name: str) -> list[Path]:
+    """Return the files and folders that a policy's name leads to: a network's, or users' code."""
+    if is_stored(name):
+        return [Path(name), Path(f"{name}{SUFFIX}")]
+    return files_named(name)
 
 
 def listed(names: Iterable[str]) -> list[str]:

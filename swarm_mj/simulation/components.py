@@ -11,7 +11,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.gain_table import GainTable
 from swarm_mj.system.fields import check_callable, name_of, setting
-from swarm_mj.system.user_code import call, file_of, make
+from swarm_mj.system.user_code import call, file_of, files_named, make
 
 GROUP, SHOWN_AS = "your own parts, each by module:Name", "MODULE:NAME"
 OWN = {"group": GROUP, "metavar": SHOWN_AS, "convert": str}
@@ -23,6 +23,15 @@ CALLED_WITH = {  # the kinds of components, and the arguments of each
 TABLE = "table:"  # begins the name of a channel that is a table of gains
 
 
+def _files(component: object) -> list[Path]:
+    """Return the files that a component's name leads to; an object has none."""
+    if not isinstance(component, str):
+        return []
+    if component.startswith(TABLE):
+        return [Path(component.removeprefix(TABLE))]
+    return files_named(component)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Components:
     """A mission's channel, controller and scene: objects or names; None is the mission's own.
@@ -31,9 +40,13 @@ class Components:
     """
 
     # Any admits objects; files and command lines hold names only.
-    channel: Any = setting(None, "who decodes whom; or table:FILE", shown="free space", **OWN)
-    controller: Any = setting(None, "what drives the robots", shown="the task's", **OWN)
-    scene: Any = setting(None, "a function that adds obstacles", shown="none", **OWN)
+    channel: Any = setting(
+        None, "who decodes whom; or table:FILE", shown="free space", reads=_files, **OWN
+    )
+    controller: Any = setting(
+        None, "what drives the robots", shown="the task's", reads=_files, **OWN
+    )
+    scene: Any = setting(None, "a function that adds obstacles", shown="none", reads=_files, **OWN)
 
     def __post_init__(self) -> None:
         for kind, component in self.given.items():

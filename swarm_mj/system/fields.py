@@ -5,11 +5,12 @@ line at once.
 """
 
 import inspect
-from collections.abc import Callable, Collection, Iterable, Mapping
-from dataclasses import MISSING, Field, dataclass, field, fields, replace
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
+from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
 from difflib import get_close_matches
 from functools import cache, partial
 from numbers import Integral, Real
+from pathlib import Path
 from types import MappingProxyType, NoneType
 from typing import Any, Literal, TypeVar, cast, get_args, get_origin
 
@@ -67,6 +68,7 @@ class Meaning:
     shown: str | None = None
     flag: str = ""
     convert: Callable[[str], object] | None = None
+    reads: Callable[[Any], Iterable[Path]] | None = None
     is_positional: bool = False
     is_common: bool = False
 
@@ -98,6 +100,7 @@ def setting(
     shown: str | None = None,
     flag: str = "",
     convert: Callable[[str], object] | None = None,
+    reads: Callable[[Any], Iterable[Path]] | None = None,
     is_positional: bool = False,
     is_common: bool = False,
 ) -> Value:
@@ -120,6 +123,7 @@ def setting(
         shown: What the help says in place of the default; "" is nothing.
         flag: Its option, if that is not made from its name.
         convert: Makes the value of what was typed.
+        reads: Returns the files that a value names to be read, which no output may replace.
         is_positional: Whether the option has no flag.
         is_common: Whether `--help` shows it, and does not leave it to `--help-all`.
 
@@ -142,6 +146,7 @@ def setting(
         shown=shown,
         flag=flag,
         convert=convert,
+        reads=reads,
         is_positional=is_positional,
         is_common=is_common,
     )
@@ -221,6 +226,23 @@ def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
         if kind_of(spec) is float:
             plain = tuple(map(float, plain))
         object.__setattr__(settings, spec.name, plain if has_many else plain[0])
+
+
+def the_file(path: Path) -> list[Path]:
+    """Return the one file that is named: what a field `reads` whose value is a path."""
+    return [path]
+
+
+def files_read(settings: Any) -> Iterator[Path]:  # noqa: ANN401 - any dataclass
+    """Yield the files that a dataclass's fields, and those nested in them, name to be read."""
+    for spec in fields(settings):
+        reads = about_of(spec).reads
+        value = getattr(settings, spec.name)
+        for each in value if isinstance(value, tuple) else (value,):
+            if is_dataclass(each):
+                yield from files_read(each)
+            elif reads is not None and each is not None:
+                yield from reads(each)
 
 
 def kind_of(spec: Field[Any]) -> object:

@@ -11,6 +11,8 @@ from typing import IO, Any
 
 # A Python that runs nothing out of the folder one stands in, where a numpy.py may lie.
 PYTHON = (sys.executable, "-P")
+# The same for a Python that a library starts.
+SAFE_PATH = "PYTHONSAFEPATH"
 LONGEST_S = 120.0  # of a trial; the first flight of an installation compiles for ten seconds
 # Reads until its pipe is closed: the kernel does so when the one who writes has ended.
 GUARD = """
@@ -23,6 +25,24 @@ for number in [int(line) for line in sys.stdin]:
 """
 # Waits for its guard to know it; is gone if nobody is left to say so.
 GATE = 'read -r go && exec "$@"'
+
+
+@contextmanager
+def safe_children() -> Iterator[None]:
+    """Let every Python that is started within it run nothing out of the folder one stands in.
+
+    Libraries start some, too: glfw, which MuJoCo imports, looks for its own library by `python -c`,
+    and would run a ctypes.py that lies here.
+    """
+    before = os.environ.get(SAFE_PATH)
+    os.environ[SAFE_PATH] = "1"
+    try:
+        yield
+    finally:
+        if before is None:
+            del os.environ[SAFE_PATH]
+        else:
+            os.environ[SAFE_PATH] = before
 
 
 @contextmanager

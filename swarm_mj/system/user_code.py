@@ -128,6 +128,19 @@ def file_of(name: str) -> Path | None:
     return Path(file) if file else None
 
 
+def files_named(name: str) -> list[Path]:
+    """Return the files that may hold the code of `module:Name`: to look is not to load it."""
+    module, colon, _ = name.partition(":")
+    if not colon:
+        return []
+    here = Path(*module.split("."))
+    files = [here.with_suffix(".py"), here / "__init__.py"]
+    loaded = file_of(name)
+    if loaded is not None:
+        files.append(loaded)
+    return files
+
+
 @contextmanager
 def one_line_each() -> Iterator[None]:
     """Turn what users' code raises within it into a ValueError of one line that names the code."""

@@ -59,6 +59,17 @@ def test_bench_shows_learning_and_leaves_the_evaluation_out(quick, capsys):
     assert learned["rows"] == [{"name": "train --credit team", "values": [12.34], "unit": "/ s"}]
 
 
+@pytest.mark.parametrize(("flag", "name"), [("--json", "b.json"), ("--plot", "b.svg")])
+def test_an_existing_file_needs_force(quick, capsys, flag, name):
+    (quick / name).write_text("precious")
+    teams = ["--robots", "3", "4"] if flag == "--plot" else []
+    assert main([*QUICK, *teams, flag, name]) == 2
+    assert f"{flag} {name} exists; name another, or replace it with" in capsys.readouterr().err
+    assert (quick / name).read_text() == "precious"
+    assert main([*QUICK, *teams, flag, name, "--force"]) == 0
+    assert (quick / name).read_text() != "precious"
+
+
 @pytest.mark.usefixtures("quick")
 def test_no_network_decides_without_learning(capsys):
     assert main([*QUICK, "--no-learning"]) == 0

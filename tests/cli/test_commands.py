@@ -3,9 +3,12 @@
 import ctypes
 import os
 import signal
+import subprocess
+import sys
 import time
 from contextlib import suppress
 from importlib import import_module
+from pathlib import Path
 
 import pytest
 
@@ -84,3 +87,22 @@ def test_an_interruption_that_is_swallowed_while_modules_load_ends_a_command(
     monkeypatch.setattr("swarm_mj.cli.importlib.import_module", loading)
     assert main([command]) == INTERRUPTED
     assert capsys.readouterr().out == ""
+
+
+def test_a_command_runs_nothing_of_the_folder_here(trapped):
+    """glfw, which MuJoCo imports, starts a Python in the current folder."""
+    environment = dict(os.environ)
+    environment.pop("MUJOCO_GL", None)  # MuJoCo then loads OpenGL
+    program = Path(sys.executable).with_name("swarm-mj")
+    command = [program, "scene", "--robots", "3", "--out", "a.xml"]
+    done = subprocess.run(command, env=environment, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stderr
+    assert not trapped.exists()
+
+
+def test_what_comes_after_a_command_is_as_before(monkeypatch, capsys):
+    """Notebooks and programs that call `main` start Pythons of their own."""
+    monkeypatch.delenv("PYTHONSAFEPATH", raising=False)
+    assert main(["policies", "tdma"]) == 0
+    assert "PYTHONSAFEPATH" not in os.environ
+    assert capsys.readouterr().out

@@ -108,6 +108,15 @@ REFUSED = {
     "or leave burst_end out",
     "mission = 3": "[mission] must be of the type dict",
     "[missions]": "at least 1 policy and 1 regime",
+    "missions = 3": "[missions] must be of the type dict, such as tables, [missions.NAME], not 3",
+    "missions = []": "[missions] must be of the type dict",
+    "[[missions]]": "[missions] must be of the type dict",
+    "[missions]\na = 3": "[missions.a] must be of the type dict",
+    "[study]\npolicies = 3": 'policies must be of the type tuple, such as ["tdma", "mst"], not 3',
+    "[study]\npolicies = [3]": 'each policy must be of the type str, such as "tdma", not 3',
+    "[study]\ncomponents = 3": "[study.components] must be of the type dict",
+    "[study.components]\nchannel = 3": "[study.components] channel must be of the type str",
+    "[study.components]\nchanel = 'a:b'": "did you mean channel?",
     "[mission": "study s.toml: Expected ']'",
 }
 
@@ -118,6 +127,56 @@ def test_what_no_study_may_say_is_refused_in_a_line_that_names_the_file(refusal,
     line = refusal("study", "run", "s.toml")
     assert line.startswith("swarm-mj: error: study s.toml: ")
     assert REFUSED[text] in line
+
+
+@pytest.mark.parametrize("text", ["a = " + "[" * 50_000, "a = " + "{a = " * 50_000])
+def test_a_file_that_is_nested_deep_is_refused(refusal, tmp_path, text):
+    (tmp_path / "s.toml").write_text(text)
+    assert "study s.toml: it is nested too deep" in refusal("study", "run", "s.toml")
+
+
+EVIL = {  # where a study may name code
+    "policy": "[study]\npolicies = ['evil:Mine']",
+    "features": "[study]\npolicies = ['gnn']\nfeatures = 'evil:Mine'",
+    "channel": "[study.components]\nchannel = 'evil:Mine'",
+    "controller": "[study.components]\ncontroller = 'evil:Mine'",
+    "scene": "[study.components]\nscene = 'evil:Mine'",
+}
+
+
+@pytest.mark.parametrize("kind", EVIL)
+def test_code_that_a_file_names_is_run_only_if_it_is_trusted(refusal, swarm_mj, tmp_path, kind):
+    (tmp_path / "evil.py").write_text("open('sprung', 'w').write('run')\nMine = None\n")
+    (tmp_path / "s.toml").write_text(EVIL[kind])
+    said = refusal("study", "run", "s.toml")
+    assert said.startswith("swarm-mj: error: study s.toml: it runs someone's own evil:Mine; ")
+    assert said.endswith("if you trust that code, give --trust")
+    assert not (tmp_path / "sprung").exists()
+    swarm_mj("study", "run", "s.toml", "--trust")
+    # Features are loaded only for a policy that was trained on them.
+    assert (tmp_path / "sprung").exists() == (kind != "features")
+
+
+NINE = [0.01 * n for n in range(1, 10)]
+LOSSES = ("erasure", "burst_begin", "burst_end", "range_ratio", "velocity_ratio", "shadowing_db")
+
+
+def test_lists_that_multiply_to_too_many_missions_are_refused_before_one_is_made(read, monkeypatch):
+    """Seven lists of nine values neither ended nor were refused."""
+    monkeypatch.setattr("swarm_mj.cli.mission_options.make_mission", None)
+    lists = "".join(f"{name} = {NINE}\n" for name in LOSSES)
+    rule = (
+        r"multiply to 531441 missions \(9 of range_ratio x .*\), and up to 10000 are allowed; give"
+    )
+    with pytest.raises(ValueError, match=rf"s\.toml: \[mission\]: .* {rule} fewer values"):
+        read(f"[mission]\n{lists}")
+
+
+def test_tables_of_too_many_missions_are_refused(read, monkeypatch):
+    monkeypatch.setattr("swarm_mj.cli.study.MAX_REGIMES", 4)
+    assert len(read("[missions.a]\nnum_robots = [2, 3, 4, 5]\n").regimes) == 4
+    with pytest.raises(ValueError, match="more than 4 missions, the most allowed"):
+        read("[missions.a]\nnum_robots = [2, 3, 4]\n[missions.b]\nnum_robots = [5, 6]\n")
 
 
 @pytest.mark.parametrize(

@@ -1,10 +1,12 @@
 """Missions as rows of Parquet, and their differences by hand."""
 
 import json
+import re
 from dataclasses import asdict, fields, replace
 
 import numpy as np
 import pandas as pd
+import pyarrow as pa
 import pytest
 from pyarrow import parquet
 
@@ -12,6 +14,7 @@ import swarm_mj
 from swarm_mj.evaluation.missions_table import compared, read_missions, write_missions
 from swarm_mj.mission import Mission, paper
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
+from swarm_mj.simulation.components import CALLED_WITH
 
 MISSION = paper("flocking", num_robots=5, num_windows=6, range_ratio=1.0)
 
@@ -100,3 +103,81 @@ def test_what_is_no_parquet_is_refused(tmp_path):
     (tmp_path / "r.csv").write_text("policy\nmst\n")
     with pytest.raises(ValueError, match=r"missions .*r\.csv: .*make them with --parquet"):
         read_missions(tmp_path / "r.csv")
+
+
+def changed(path, **columns):
+    """A file with other columns; None leaves one out."""
+    table = parquet.read_table(path)
+    for name, values in columns.items():
+        index = table.schema.get_field_index(name)
+        table = table.remove_column(index)
+        if values is not None:
+            table = table.append_column(name, pa.array(values))
+    parquet.write_table(table, path)
+    return path
+
+
+NEEDED = ["seed", "policy", "aoi", "task_cost", "velocity_variance", *CALLED_WITH]
+FOREIGN = {  # two values in place of a column's, and what is said of them
+    "lists": ("aoi", [[1.0], [2.0]], "column aoi must hold double, not list<"),
+    "dicts": ("policy", [{"a": 1}, {"a": 2}], "column policy must hold string, not struct<"),
+    "texts": ("task_cost", ["1.0", "2.0"], "column task_cost must hold double, not string"),
+    "numbers": ("task", [1, 2], "column task must hold string, not int64"),
+    "truths": ("seed", [True, False], "column seed must hold int64, not bool"),
+    "fractions": ("seed", [1.5, 2.5], "column seed must hold int64, not double"),
+    "huge": ("seed", pa.array([2**63, 1], pa.uint64()), "9223372036854775808"),
+    "bytes": ("policy", [b"mst", b"\xff"], "column policy must hold string, not binary"),
+    "gaps": ("num_robots", [5, None], "column num_robots lacks 1 values"),
+    "infinite": ("aoi", [1.0, np.inf], "column aoi holds an infinite number"),
+}
+
+
+@pytest.mark.parametrize("name", NEEDED)
+def test_a_file_without_a_column_is_refused_by_its_name(written, name):
+    path = changed(written("m.parquet", [1.0, 2.0]), **{name: None})
+    with pytest.raises(ValueError, match=rf"m\.parquet: it has no column {name}; make them with"):
+        read_missions(path)
+
+
+@pytest.mark.parametrize("case", FOREIGN)
+def test_columns_that_hold_something_else_are_refused(written, case):
+    name, values, said = FOREIGN[case]
+    path = changed(written("m.parquet", [1.0, 2.0]), **{name: values})
+    with pytest.raises(ValueError, match=rf"^missions .*m\.parquet: .*{re.escape(said)}"):
+        read_missions(path)
+
+
+def test_what_other_programs_add_or_store_otherwise_changes_nothing(written):
+    """Larger texts, an index, metadata that lies, and columns of theirs."""
+    path = written("m.parquet", [1.0, 2.0])
+    before = read_missions(path)
+    table = parquet.read_table(path)
+    policies = pa.array(["mst", "mst"], pa.large_string())
+    table = table.set_column(0, "policy", policies).append_column("mine", pa.array([[1], [2]]))
+    lies = {b"pandas": b'{"index_columns": ["none"], "columns": 3}'}
+    parquet.write_table(table.replace_schema_metadata(lies), path)
+    assert read_missions(path).equals(before)
+
+
+def test_a_file_with_a_mission_twice_is_refused(written):
+    path = written("m.parquet", [1.0, 2.0])
+    table = parquet.read_table(path)
+    parquet.write_table(pa.concat_tables([table, table]), path)
+    rule = "policy mst and seed 5 is there more than once, as are 1 others"
+    with pytest.raises(ValueError, match=rf"m\.parquet: .*{rule}"):
+        read_missions(path)
+
+
+def test_a_file_without_missions_is_refused(written):
+    path = written("m.parquet", [1.0, 2.0])
+    parquet.write_table(parquet.read_table(path).slice(0, 0), path)
+    with pytest.raises(ValueError, match="has from 1 to 10000000 missions, not 0"):
+        read_missions(path)
+
+
+def test_a_column_that_is_there_twice_is_refused(written):
+    path = written("m.parquet", [1.0, 2.0])
+    table = parquet.read_table(path)
+    parquet.write_table(table.append_column("aoi", table.column("aoi")), path)
+    with pytest.raises(ValueError, match="several columns aoi"):
+        read_missions(path)

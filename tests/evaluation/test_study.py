@@ -66,3 +66,18 @@ def test_what_a_study_refuses(overrides, complaint):
 
 def test_the_last_seed_is_allowed():
     assert study(seed=2**63 - 100).batches[-1].seeds[-1] == 2**63 - 1
+
+
+def test_more_missions_than_can_be_listed_are_refused():
+    """Before policies are made for them."""
+    regimes = tuple(paper(num_robots=n) for n in range(2, 1003))
+    rule = r"up to 10000000 missions, not 100100000 \(100000 episodes x 1001 regimes x 1 policies\)"
+    with pytest.raises(ValueError, match=rule):
+        Study(policies=("tdma",), regimes=regimes, episodes=100_000)
+
+
+def test_more_regimes_than_fit_are_refused(monkeypatch):
+    monkeypatch.setattr("swarm_mj.evaluation.study.MAX_REGIMES", 2)
+    regimes = tuple(paper(num_robots=n) for n in (2, 3, 4))
+    with pytest.raises(ValueError, match="up to 2 regimes, not 3; fly them in several studies"):
+        Study(policies=("tdma",), regimes=regimes)

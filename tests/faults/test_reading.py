@@ -11,9 +11,12 @@ import synthetic
 from damage import RESULTS, complaint, damaged, program, put_no_file, told_or_read
 from tiny_policies import save_tiny
 
+import swarm_mj
 from swarm_mj.cli import main, script
+from swarm_mj.evaluation.missions_table import read_missions, write_missions
 from swarm_mj.evaluation.results import COLUMNS, read_results, write_results
 from swarm_mj.learning.run_folder import read_curve
+from swarm_mj.mission import paper
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.policies.tuning import TABLE, read_table
 
@@ -48,6 +51,16 @@ def test_damaged_files_are_told_or_sound(what, tmp_path, tries):
     write()
     for _ in damaged(path, tries):
         told_or_read(lambda: read(path))
+
+
+@pytest.mark.fault("damaged files are told")
+def test_damaged_missions_are_told_or_sound(tmp_path, tries):
+    """Whatever is flipped or cut, `study compare` says so in a line, or compares."""
+    path = tmp_path / "m.parquet"
+    mission = paper(num_robots=3, num_windows=3, range_ratio=1.0)
+    write_missions(path, swarm_mj.evaluate("tdma", mission, num_missions=3).results)
+    for _ in damaged(path, tries):
+        told_or_read(lambda: read_missions(path))
 
 
 def with_cells(path, **cells):

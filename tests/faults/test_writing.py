@@ -293,6 +293,64 @@ def test_outputs_are_no_inputs_and_no_progress(here, capsys, arguments, complain
     assert (here / "p" / "s.json").read_text() == "{}"
 
 
+WALLS = """<mujoco><worldbody>
+<geom name="wall" type="box" size="1 20 5" pos="30 0 5" group="1"/></worldbody></mujoco>
+"""
+GAINS = "x1_m,y1_m,x2_m,y2_m,gain_db\n" + "".join(f"0,0,{n},0,-60\n" for n in range(1, 10))
+OWN = """from swarm_mj.policies.centralised import RoundRobin
+class Mine(RoundRobin):
+    about = None
+"""
+STUDY = """[study]
+policies = ["tdma"]
+episodes = 1
+[mission]
+num_robots = 5
+num_windows = 12
+range_ratio = 1
+"""
+READ = {  # files that commands read, and what each holds
+    "a.xml": WALLS,
+    "g.csv": GAINS,
+    "mine.py": OWN,
+    "s.toml": STUDY,
+    "walk.csv": Path(WALK).read_text(encoding="utf-8"),
+}
+# What would write over an input: through its own name, where the output may have it, or a link.
+OVER_INPUTS = {
+    "table": ["evaluate", *SMALL, "--channel", "table:g.csv", "--csv", "g.csv"],
+    "table, link": ["evaluate", *SMALL, "--channel", "table:g.csv", "--json", "to-g.csv.json"],
+    "table of a flight": ["fly", *SMALL, "--channel", "table:g.csv", "--json", "to-g.csv.json"],
+    "arena": ["scene", "--arena", "./a.xml", "--out", "a.xml"],
+    "arena, link": ["scene", "--arena", "a.xml", "--out", "to-a.xml.xml"],
+    "arena of a flight": ["fly", *SMALL, "--arena", "a.xml", "--json", "to-a.xml.json"],
+    "arena of an evaluation": ["evaluate", *SMALL, "--arena", "a.xml", "--csv", "to-a.xml.csv"],
+    "study": ["study", "run", "s.toml", "--csv", "to-s.toml.csv"],
+    "chart of a study": ["study", "run", "s.toml", "--plot", "to-s.toml.svg"],
+    "own policy": ["fly", *SMALL, "--policy", "mine:Mine", "--json", "to-mine.py.json"],
+    "own policies": ["evaluate", *SMALL, "--policy", "mine:Mine", "--json", "to-mine.py.json"],
+    "results": ["figures", "walk.csv", "--figure", "fig5", "--format", "svg", "--out", "figures"],
+}
+
+
+@pytest.mark.fault("outputs that cannot be")
+@pytest.mark.parametrize("case", OVER_INPUTS)
+def test_no_input_of_any_kind_is_an_output(forks, tmp_path, case):
+    """What an option names to be read is declared on the option, and kept by every command."""
+    (tmp_path / "figures").mkdir()
+    (tmp_path / "figures" / "fig5.svg").symlink_to(tmp_path / "walk.csv")
+    for name, content in READ.items():
+        (tmp_path / name).write_text(content, encoding="utf-8")
+        for ending in ("csv", "json", "svg", "xml"):
+            (tmp_path / f"to-{name}.{ending}").symlink_to(name)
+    done = forks.run(tmp_path, "swarm_mj", *OVER_INPUTS[case], "--force")
+    assert (done.returncode, done.stdout) == (2, ""), done.stderr
+    assert "is an input, or part of one; name another" in done.stderr
+    for name, content in READ.items():
+        assert (tmp_path / name).read_text(encoding="utf-8") == content
+    assert not list(tmp_path.glob("*.progress"))
+
+
 @pytest.mark.fault("outputs that cannot be")
 @pytest.mark.parametrize(
     ("name", "complaint"),
