@@ -39,10 +39,10 @@ class Batch:
 class BatchCosts:
     """The costs of missions, in the order of their seeds; nan is what does not exist."""
 
-    aoi: Float[np.ndarray, "B"]  # Eq. 10, mean over windows [windows]
+    aoi: Float[np.ndarray, "B"]  # age of information, mean over windows [windows]
     aoi_steady: Float[np.ndarray, "B"]  # as above, over the second half
     aoi_floor: Float[np.ndarray, "B"]  # the connectivity floor, as above; nan: custom channel
-    velocity_variance: Float[np.ndarray, "B"]  # Eq. 17, mean over windows [m²/s²]
+    velocity_variance: Float[np.ndarray, "B"]  # mean over windows [m²/s²]
     hops: Float[np.ndarray, "B"]  # depth of the parent trees, mean over windows
     task_cost: Float[np.ndarray, "B"]  # mean over windows; nan if the controller has none
     task_cost_last: Float[np.ndarray, "B"]  # as above, after the last window
