@@ -21,8 +21,8 @@ class FlightSummary(dict[str, Any]):
     """
 
     num_windows: int  # that were flown
-    aoi_mean: float  # age of information, mean over windows (Eq. 10) [windows]
-    velocity_variance_mean: float  # mean over windows (Eq. 17) [m²/s²]
+    aoi_mean: float  # age of information, mean over windows [windows]
+    velocity_variance_mean: float  # mean over windows [m²/s²]
     velocity_variance_first: float  # after the first window [m²/s²]
     velocity_variance_last: float  # after the last window [m²/s²]
     task_cost_name: str | None  # as the controller calls it; None if it has none

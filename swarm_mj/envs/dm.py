@@ -64,7 +64,7 @@ def make_environment(
 class SwarmPhysics(mujoco.Physics):
     """A swarm of one mission, as dm_control's `named`, cameras and viewer know a physics.
 
-    Its qpos and qvel are p and v of Eq. 15. A copy of it is a still, to be looked at only.
+    Its qpos and qvel are p and v (IV-A). A copy of it is a still, to be looked at only.
     """
 
     def __init__(self, swarm: Swarm, seed: int) -> None:
@@ -133,7 +133,7 @@ class SwarmTask(_Task):
         return OrderedDict(known, now=physics.swarm.now[0])
 
     def get_reward(self, physics: SwarmPhysics) -> float:
-        """Return minus the age of information after the window (cost of Eq. 10) [windows]."""
+        """Return minus the age of information after the window [windows]."""
         return -float(physics.costs.age_windows[0])
 
     def get_termination(self, physics: SwarmPhysics) -> float | None:

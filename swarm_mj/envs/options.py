@@ -66,7 +66,7 @@ def make_batch(
         features: Features of each teammate: the name of a feature set, or `module:Name` of your
             own.
         reward: "aoi", minus the age of information [windows]; "velocity-variance", minus the
-            variance of Eq. 17 [m²/s²]; "task-cost", minus the controller's cost of the task, in its
+            velocity variance [m²/s²]; "task-cost", minus the controller's cost of the task, in its
             unit; or "credit", each robot's own: by how much the team's age would be higher had the
             robot been silent in this window [windows].
         with_parents: Whether robots see the parents P as well, for graph networks.

@@ -1,8 +1,8 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -12,6 +12,7 @@ from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
+from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -35,23 +36,113 @@ class Batch:
     seeds: Sequence[int] = ()  # one per mission
 
 
+@dataclass(frozen=True, kw_only=True)
+class Moment:
+    """What a window cost, and the state at its end, from which every column takes its term."""
+
+    window: WindowRecord
+    timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
+    now: Float[np.ndarray, "B"]  # t [windows]
+    is_active: Bool[np.ndarray, "B N"]
+    is_steady: bool  # whether the window is of the second half
+    floor: Float[np.ndarray, "B"]  # the connectivity floor [windows]; nan: custom channel
+
+    @property
+    def costs(self) -> WindowCosts:
+        """The window's costs."""
+        return self.window.costs
+
+    @property
+    def task_cost(self) -> Float[np.ndarray, "B"]:
+        """The cost of the controller's task; nan if it has none."""
+        task_cost = self.costs.task_cost
+        return np.full(len(self.now), np.nan) if task_cost is None else task_cost.value
+
+    @property
+    def completed_at(self) -> Float[np.ndarray, "B"]:
+        """The end of this window where by then everyone has heard of everyone, or nan [windows]."""
+        return np.where(self.costs.is_complete, self.now, np.nan)
+
+
+Value = TypeVar("Value")  # one number a mission
+Add = Callable[[np.ndarray, np.ndarray], np.ndarray]  # the next term to the sum so far
+
+
+@dataclass(frozen=True, kw_only=True)
+class Column:
+    """How one cost of missions is made of their windows."""
+
+    term: Callable[[Moment], Any]  # of a window: an array of a number a mission
+    start: float = 0.0  # before the first window
+    add: Add = np.add
+    divisor: Callable[[int], int] = lambda _num_windows: 1  # of the sum, by the mission's length
+
+
+def _latest(_before: np.ndarray, term: np.ndarray) -> np.ndarray:
+    return term
+
+
+def _num_steady(num_windows: int) -> int:
+    """Return how many windows the second half has."""
+    return num_windows - num_windows // 2
+
+
+def _total(term: Callable[[Moment], Value]) -> Value:
+    return field(metadata={"column": Column(term=term)})
+
+
+def _mean(term: Callable[[Moment], Value]) -> Value:
+    return field(metadata={"column": Column(term=term, divisor=lambda num_windows: num_windows)})
+
+
+def _steady_mean(term: Callable[[Moment], Value]) -> Value:
+    return field(metadata={"column": Column(term=term, divisor=_num_steady)})
+
+
+def _last(term: Callable[[Moment], Value]) -> Value:
+    return field(metadata={"column": Column(term=term, start=np.nan, add=_latest)})
+
+
+def _first(term: Callable[[Moment], Value]) -> Value:
+    """Return a column of the least of its terms, of which nan does not count."""
+    return field(metadata={"column": Column(term=term, start=np.nan, add=np.fmin)})
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BatchCosts:
-    """The costs of missions, in the order of their seeds; nan is what does not exist."""
+    """The costs of missions, in the order of their seeds; nan is what does not exist.
 
-    aoi: Float[np.ndarray, "B"]  # Eq. 10, mean over windows [windows]
-    aoi_steady: Float[np.ndarray, "B"]  # as above, over the second half
-    aoi_floor: Float[np.ndarray, "B"]  # the connectivity floor, as above; nan: custom channel
-    velocity_variance: Float[np.ndarray, "B"]  # Eq. 17, mean over windows [m²/s²]
-    hops: Float[np.ndarray, "B"]  # depth of the parent trees, mean over windows
-    task_cost: Float[np.ndarray, "B"]  # mean over windows; nan if the controller has none
-    task_cost_last: Float[np.ndarray, "B"]  # as above, after the last window
-    complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone; nan: never
-    packets_sent: Float[np.ndarray, "B"]  # requests or broadcasts
-    packets_transmitted: Float[np.ndarray, "B"]  # all that were on the air, responses too
-    packets_delivered: Float[np.ndarray, "B"]  # requests that their addressee decoded
-    packets_heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
-    packets_receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
+    Each field is declared with the way it is made of windows; all but `ages` are one per mission.
+    """
+
+    # Age of information, mean over windows [windows].
+    aoi: Float[np.ndarray, "B"] = _mean(lambda at: at.costs.age_windows)
+    # As above, over the second half.
+    aoi_steady: Float[np.ndarray, "B"] = _steady_mean(
+        lambda at: at.costs.age_windows * at.is_steady
+    )
+    # The connectivity floor, over all windows; nan: custom channel.
+    aoi_floor: Float[np.ndarray, "B"] = _mean(lambda at: at.floor)
+    # Mean over windows [m²/s²].
+    velocity_variance: Float[np.ndarray, "B"] = _mean(lambda at: at.costs.velocity_variance_m2ps2)
+    # Depth of the parent trees, mean over windows.
+    hops: Float[np.ndarray, "B"] = _mean(lambda at: at.window.hops)
+    # Mean over windows; nan if the controller has none.
+    task_cost: Float[np.ndarray, "B"] = _mean(lambda at: at.task_cost)
+    # As above, after the last window.
+    task_cost_last: Float[np.ndarray, "B"] = _last(lambda at: at.task_cost)
+    # Everyone had first heard of everyone [windows]; nan: never.
+    complete_window: Float[np.ndarray, "B"] = _first(lambda at: at.completed_at)
+    # Requests or broadcasts.
+    packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.sent)
+    # All that were on the air, responses too.
+    packets_transmitted: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.transmitted)
+    # Requests that their addressee decoded.
+    packets_delivered: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.delivered)
+    # Broadcasts that at least one robot decoded.
+    packets_heard: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.heard)
+    # Times that a robot decoded a broadcast.
+    packets_receptions: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.receptions)
     # Over all missions: how often a robot's knowledge of another had each age, in slots, from 0 to
     # the mission's length.
     ages: Int[np.ndarray, "bins"]
@@ -65,6 +156,12 @@ class BatchCosts:
         if cost is TASK_COST:
             return self.task_cost
         raise ValueError(f"missions have no cost {cost.column}")
+
+
+COLUMNS: dict[str, Column] = {
+    spec.name: spec.metadata["column"] for spec in fields(BatchCosts) if "column" in spec.metadata
+}
+"""The costs of each mission by their names: all but `ages`, which counts over all missions."""
 
 
 @one_line_each()  # what is raised loses its places on the way between processes
@@ -86,69 +183,54 @@ def fly_batch(batch: Batch) -> BatchCosts:
 
 def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
     """Add up what missions cost, window by window: however many fly, the sums round alike."""
+    num_windows = swarm.mission.num_windows
+    num_missions = len(swarm.now)
+    sums = {name: np.full(num_missions, column.start) for name, column in COLUMNS.items()}
+    ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
+    for at in _moments(swarm, flown):
+        for name, column in COLUMNS.items():
+            sums[name] = column.add(sums[name], column.term(at))
+        count_ages(at.timestamp, at.now, ages, at.is_active)
+    costs: dict[str, np.ndarray] = {}
+    for name, column in COLUMNS.items():
+        costs[name] = _finite(sums[name] / column.divisor(num_windows))
+    return BatchCosts(**costs, ages=ages)
+
+
+def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
+    """Yield the end of each window."""
     mission = swarm.mission
-    shape = swarm.states.position_m.shape[:2]
-    num_windows = mission.num_windows
-    num_steady = num_windows - num_windows // 2
+    num_missions, num_robots = swarm.states.position_m.shape[:2]
+    num_early = mission.num_windows - _num_steady(mission.num_windows)
     # The floor is by the mission's own range, which other channels need not have.
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)
-    missing = np.full(shape[0], np.nan)
-    complete = missing
-    task_cost = missing
-    # Sums over windows, of each mission.
-    aoi = np.zeros(shape[0])
-    aoi_steady = np.zeros(shape[0])
-    aoi_floor = np.zeros(shape[0])
-    velocity_variance = np.zeros(shape[0])
-    hops = np.zeros(shape[0])
-    task_cost_sum = np.zeros(shape[0])
-    sent = np.zeros(shape[0])
-    transmitted = np.zeros(shape[0])
-    delivered = np.zeros(shape[0])
-    heard = np.zeros(shape[0])
-    receptions = np.zeros(shape[0])
-    ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
+    floor = np.full(num_missions, np.nan)
     for window in flown:
-        costs = window.costs
         states = swarm.states
         now = swarm.now
         # Always an array, so that the loops below are compiled for one kind of arguments.
-        is_on = np.ones(shape, np.bool_) if states.is_active is None else states.is_active
-        floor = missing
+        is_active = states.is_active
+        if is_active is None:
+            is_active = np.ones((num_missions, num_robots), np.bool_)
         if has_floor:
-            floor = connectivity_floor(shared, states.position_m, mission.range_m, now, is_on)
-        task_cost = costs.task_cost.value if costs.task_cost else missing
-        aoi += costs.age_windows
-        aoi_steady += costs.age_windows * (now[0] > num_windows - num_steady)
-        aoi_floor += floor
-        velocity_variance += costs.velocity_variance_m2ps2
-        hops += window.hops
-        task_cost_sum += task_cost
-        packets = costs.packets
-        sent += packets.sent
-        transmitted += packets.transmitted
-        delivered += packets.delivered
-        heard += packets.heard
-        receptions += packets.receptions
-        complete = np.fmin(complete, np.where(costs.is_complete, now, np.nan))
-        count_ages(swarm.buffers.timestamp, now, ages, is_on)
-    return BatchCosts(
-        aoi=_finite(aoi / num_windows),
-        aoi_steady=_finite(aoi_steady / num_steady),
-        aoi_floor=_finite(aoi_floor / num_windows),
-        velocity_variance=_finite(velocity_variance / num_windows),
-        hops=_finite(hops / num_windows),
-        task_cost=_finite(task_cost_sum / num_windows),
-        task_cost_last=_finite(task_cost),
-        complete_window=_finite(complete),
-        packets_sent=_finite(sent),
-        packets_transmitted=_finite(transmitted),
-        packets_delivered=_finite(delivered),
-        packets_heard=_finite(heard),
-        packets_receptions=_finite(receptions),
-        ages=ages,
-    )
+            floor = connectivity_floor(shared, states.position_m, mission.range_m, now, is_active)
+        yield Moment(
+            window=window,
+            timestamp=swarm.buffers.timestamp,
+            now=now,
+            is_active=is_active,
+            is_steady=bool(now[0] > num_early),
+            floor=floor,
+        )
+
+
+def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
+    """Return batches of the same policy and regime as one, in the order given; `ages` add up."""
+    costs: dict[str, np.ndarray] = {}
+    for name in COLUMNS:
+        costs[name] = np.concatenate([getattr(each, name) for each in batches])
+    return BatchCosts(**costs, ages=np.sum([each.ages for each in batches], axis=0))
 
 
 def _finite(values: Float[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:

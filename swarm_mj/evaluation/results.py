@@ -29,7 +29,7 @@ MAX_BYTES = 100_000_000  # of a file
 class Result:
     """Costs of one policy in one regime, over all missions; None is what does not exist.
 
-    Age of information (AoI, Eq. 10) and ages are in windows, velocity variance (Eq. 17) in m²/s².
+    Age of information (AoI) and ages are in windows, velocity variance in m²/s².
     `_std` is the sample's standard deviation, `_sem` the mean's standard error, `_ci_` the mean's
     bootstrap interval of 95 %; all are over missions unless a comment says otherwise.
 
@@ -197,8 +197,8 @@ class Evaluated:
     """A result and its missions, in the order of their seeds."""
 
     result: Result
-    aoi: list[float]  # Eq. 10, mean over windows [windows]
-    velocity_variance: list[float]  # Eq. 17, mean over windows [m²/s²]
+    aoi: list[float]  # age of information, mean over windows [windows]
+    velocity_variance: list[float]  # mean over windows [m²/s²]
     task_cost: list[float] | None  # mean over windows; None if the controller has none
 
     @property

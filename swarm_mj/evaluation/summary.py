@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from swarm_mj.evaluation.batch import BatchCosts
+from swarm_mj.evaluation.batch import BatchCosts, merge
 from swarm_mj.evaluation.measurements import Measurements
 from swarm_mj.evaluation.results import Evaluated, result_of, write_results
 from swarm_mj.evaluation.study import Study
@@ -53,26 +53,6 @@ def study_results(
             )
         )
     return evaluated
-
-
-def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
-    """Return batches of the same policy and regime as one, in the order given; `ages` add up."""
-    return BatchCosts(
-        aoi=np.concatenate([each.aoi for each in batches]),
-        aoi_steady=np.concatenate([each.aoi_steady for each in batches]),
-        aoi_floor=np.concatenate([each.aoi_floor for each in batches]),
-        velocity_variance=np.concatenate([each.velocity_variance for each in batches]),
-        hops=np.concatenate([each.hops for each in batches]),
-        task_cost=np.concatenate([each.task_cost for each in batches]),
-        task_cost_last=np.concatenate([each.task_cost_last for each in batches]),
-        complete_window=np.concatenate([each.complete_window for each in batches]),
-        packets_sent=np.concatenate([each.packets_sent for each in batches]),
-        packets_transmitted=np.concatenate([each.packets_transmitted for each in batches]),
-        packets_delivered=np.concatenate([each.packets_delivered for each in batches]),
-        packets_heard=np.concatenate([each.packets_heard for each in batches]),
-        packets_receptions=np.concatenate([each.packets_receptions for each in batches]),
-        ages=np.sum([each.ages for each in batches], axis=0),
-    )
 
 
 def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:

@@ -23,7 +23,7 @@ class GraphVecEnv(SwarmVecEnv):
     """Environments for PPO over the Aggregation GNN, per robot or per team by its credit.
 
     Per robot, the reward is the robot's credit, over the number of pairs. Per team, it is the
-    negative mean age of information (Eq. 10) over the mission's duration, or the negative velocity
+    negative mean age of information over the mission's duration, or the negative velocity
     variance, as in Fig. 6. Smaller teams are padded: per team with robots that do not exist, which
     are silent and see nothing.
     """

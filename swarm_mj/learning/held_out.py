@@ -81,9 +81,10 @@ def evaluate(
 ) -> Row:
     """Fly the held-out missions; return their mean costs, by the learning curve's columns.
 
-    Team sizes count alike. `aoi` is Eq. 10 [windows], with its standard error over the missions
-    unless there is one only, `aoi_steady` that of the missions' second half. `velocity_variance` is
-    Eq. 17 [m²/s²]. The best policy has the least `objective`, by the reward's cost.
+    Team sizes count alike. `aoi` is the age of information [windows], with its standard error over
+    the missions unless there is one only, `aoi_steady` that of the missions' second half.
+    `velocity_variance` is in m²/s². The best policy has the least `objective`, by the reward's
+    cost.
     """
     flights = Flights(training=training, on_window=on_window)
     flies = partial(held_out_policy, training, network)

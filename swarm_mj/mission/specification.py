@@ -247,7 +247,7 @@ class Mission:
         "free-space",
         "how power falls with distance",
         label="path loss",
-        source="Eq. 1",
+        source="II-A",
         choices=get_args(PathLossLaw),
         group=CHANNEL,
     )
@@ -447,9 +447,9 @@ class Mission:
     # Physics and walls.
     physics: PhysicsMode = setting(
         "exact",
-        "Eq. 15, or forces, as obstacles need",
+        "the paper's, or forces, as obstacles need",
         label="physics",
-        source="Eq. 15",
+        source="IV-A",
         choices=get_args(PhysicsMode),
     )
     collide: bool = setting(
@@ -477,18 +477,18 @@ class Mission:
     half_duplex: HalfDuplex = setting(
         "strict",
         label="half duplex",
-        source="Eq. 3",
+        source="II-A",
         choices=get_args(HalfDuplex),
     )
     flocking_set: FlockingSet = setting(
         "heard",
         label="flocking set F",
-        source="Eq. 16",
+        source="IV-A",
         choices=get_args(FlockingSet),
     )
     silence_is_attempt: bool = setting(
         False,
-        source="Eq. 7; the code also sets L of a silent robot to itself",
+        source="II-B; the code also sets L of a silent robot to itself",
     )
     moves_each_transmission: bool = setting(
         False,

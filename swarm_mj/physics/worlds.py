@@ -1,10 +1,11 @@
-"""The robots' dynamics (IV-A, Eq. 15): B worlds stepped side by side by MuJoCo, one window a call.
+"""The robots' dynamics (IV-A): B worlds stepped side by side by MuJoCo, one window a call.
 
 Positions come from MuJoCo's step; only the mirror at a wall writes them. Two modes:
 
-- `exact`: Eq. 15 to rounding error. Eq. 15 moves p with the velocity before the kick, MuJoCo's
-  Euler method with the velocity after it. So the servo's set point *is* v_t: one step of a window's
-  length makes the velocity v_t and adds v_t dt to p; then v_{t+1} becomes the new set point.
+- `exact`: the paper's equation to rounding error. It moves p with the velocity before the kick,
+  MuJoCo's Euler method with the velocity after it. So the servo's set point *is* v_t: one step of a
+  window's length makes the velocity v_t and adds v_t dt to p; then v_{t+1} becomes the new set
+  point.
 - `contact`: forces at 10 ms steps, and joint limits that turn the velocity round at a wall.
 """
 
@@ -131,7 +132,7 @@ class Physics:
         limit_mps2 = self._mission.max_acceleration_mps2
         window_s = self._mission.window_s
         step_s = timestep_s(self._mission)
-        # One constant acceleration per window, which ends at the clipped velocity of Eq. 15 ...
+        # One constant acceleration per window, which ends at the paper's clipped velocity ...
         target_mps = self._qvel + np.clip(acceleration_mps2, -limit_mps2, limit_mps2) * window_s
         held_mps2 = (np.clip(target_mps, -limit_mps, limit_mps) - self._qvel) / window_s
         for _ in range(num_substeps(self._mission)):

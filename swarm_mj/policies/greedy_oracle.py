@@ -3,7 +3,7 @@
 A team could not fly it; it shows how low the age of information can go. The pair of sender and
 recipient is added that most raises the gain of the whole window, interference and responses
 included, until none does. The gain is the sum over receivers i and subjects k of the rise of
-T^{i,k}: the fall of the age of information times N² (Eq. 10).
+T^{i,k}: the fall of the age of information times N².
 
 Over uncertain links a packet decodes with a probability, and timestamps are expected ones. Index
 order: `i` sends, `j` receives. Times are in slots, float32, which keeps them exact for 8 million

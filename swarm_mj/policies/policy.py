@@ -1,4 +1,4 @@
-"""Policies, whose type is what they may know: local views (Eq. 9), or the truth."""
+"""Policies, whose type is what they may know: local views, or the truth."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
@@ -66,7 +66,7 @@ class Policy:
         """Return what the robots do in a window: by Alg. 1 they request, and respond.
 
         Args:
-            mission: It says whether a silent robot notes having addressed itself (Eq. 7).
+            mission: It says whether a silent robot notes having addressed itself.
 
         Returns:
             The form of a window, which `Swarm` plays.
@@ -175,7 +175,7 @@ class BroadcastPolicy(DecentralisedPolicy):
         """Return what the robots do in a window: they broadcast twice, unanswered.
 
         Args:
-            mission: It says whether a silent robot notes having addressed itself (Eq. 7), and
+            mission: It says whether a silent robot notes having addressed itself, and
                 whether its half-duplex rule makes a broadcast name an addressee.
 
         Returns:

@@ -28,7 +28,7 @@ class Tuned:
     range_ratio: float  # of 1 km
     velocity_ratio: float  # means nothing to a team at rest
     probability: float  # the least mean age of a grid's
-    aoi_mean: float  # with it, over the episodes (Eq. 10) [windows]
+    aoi_mean: float  # with it, over the episodes [windows]
     aoi_sem: float  # standard error of that mean [windows]
     episodes: int  # missions flown with every probability of the grid
     first_seed: int  # of these, the others follow one by one

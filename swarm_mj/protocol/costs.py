@@ -1,4 +1,4 @@
-"""The costs (II-C, IV-A): age of information (Eq. 10), velocity variance (Eq. 17), packets."""
+"""The costs (II-C, IV-A): age of information, velocity variance, packets."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -125,9 +125,9 @@ def no_packets(num_missions: int) -> Shaped[np.ndarray, "B"]:
 class WindowCosts(NamedTuple):
     """The costs of one window, in every mission."""
 
-    age_windows: Float[np.ndarray, "B"]  # age of information after the window (Eq. 10)
+    age_windows: Float[np.ndarray, "B"]  # age of information after the window
     is_complete: Bool[np.ndarray, "B"]  # whether all robots know all others
-    velocity_variance_m2ps2: Float[np.ndarray, "B"]  # Eq. 17
+    velocity_variance_m2ps2: Float[np.ndarray, "B"]
     counts: Shaped[np.ndarray, "B"]  # the fates of the packets, as `COUNTS`
     task_cost: TaskCost | None = None  # after the window; None if the controller has none
 

@@ -12,13 +12,13 @@ SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
 SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
 
 
-# The rule of Eq. 8 stands here, as a condition and as the rise that follows from it. The loops
+# The rule of the merge stands here, as a condition and as the rise that follows from it. The loops
 # around it are several, because each carries other arrays: `buffers.merge_newer` whole entries,
 # `merge_timestamps` T alone, `merge_expected` the mean of T, `sotdma.frame` a bit for each subject.
 # One loop for all would take the slowest one's time.
 @compiled()
 def is_newer(sent: float, held: float) -> bool:
-    """Return whether a packet's entry replaces what its receiver holds: the condition of Eq. 8."""
+    """Return whether a packet's entry replaces what its receiver holds: the merge's condition."""
     return held < sent
 
 
@@ -30,7 +30,7 @@ def rise(sent: np.floating, held: np.floating) -> np.floating:
 
 @compiled()
 def observe_own(timestamp: Float[np.ndarray, "N N"], now: float) -> None:
-    """Let everyone observe itself, as in Eq. 5."""
+    """Let everyone observe itself at the time `now`."""
     for i in range(timestamp.shape[0]):
         timestamp[i, i] = now
 
@@ -41,7 +41,7 @@ def merge_timestamps(
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
 ) -> float:
-    """Merge senders' T of before the slot into receivers' (Eq. 8); return the sum of rises."""
+    """Merge senders' T of before the slot into receivers'; return the sum of rises."""
     total = 0.0
     for i in range(heard.shape[0]):
         j = heard[i]
@@ -60,7 +60,7 @@ def merge_expected(
     probability: Float[np.ndarray, "N"],
     merged: Float[np.ndarray, "N N"],
 ) -> None:
-    """Fill `merged`: the mean of T after Eq. 8, if packets decode with these probabilities."""
+    """Fill `merged`: the mean of T after the merge, if packets decode with these probabilities."""
     for i in range(heard.shape[0]):
         share = np.float32(probability[i])
         held = timestamp[i]

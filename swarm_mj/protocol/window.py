@@ -1,4 +1,4 @@
-"""The window (III-B, Alg. 1; IV-C): how robots share what they know, over any channel (Eq. 6).
+"""The window (III-B, Alg. 1; IV-C): how robots share what they know, over any channel.
 
 A window has two slots. In Alg. 1 they hold a transmission phase and a response phase. In IV-C both
 are broadcasts that nobody answers. Index order: `[b, i]` is robot `i` of mission `b`.
@@ -97,7 +97,7 @@ def window(
         channel: Who decodes whom. Its packets must arrive in the slot in which they were sent; for
             an `AsynchronousChannel` there is `asynchronous_window.window`.
         now: t when the window begins, [B], [windows].
-        silence_is_attempt: Whether a silent robot notes having addressed itself (Eq. 7).
+        silence_is_attempt: Whether a silent robot notes having addressed itself.
 
     Returns:
         The transmission phase and the response phase.
@@ -139,7 +139,7 @@ def broadcast(
             silence.
         channel: Who decodes whom. Its packets must arrive in the slot in which they were sent.
         now: t when the slot begins, [B], [windows].
-        silence_is_attempt: Whether a silent robot notes having addressed itself (Eq. 7).
+        silence_is_attempt: Whether a silent robot notes having addressed itself.
 
     Returns:
         The slot's phase: its recipients, and the senders decoded.
@@ -161,7 +161,7 @@ def transmit(
     channel: Channel | VaryingChannel,
     t: Float[np.ndarray, "B"],
 ) -> Phase:
-    """Return what the channel makes of the packets of the slot that ends at t [windows] (Eq. 6).
+    """Return what the channel makes of the packets of the slot that ends at t [windows].
 
     Inactive robots are silent, and decode nothing.
     """
@@ -281,7 +281,7 @@ class RequestResponse:
     """
 
     is_broadcast: ClassVar[bool] = False  # whether packets are for everyone who hears them
-    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself (Eq. 7)
+    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself
 
     def __call__(
         self,
@@ -311,7 +311,7 @@ class DoubleBroadcast:
     """
 
     is_broadcast: ClassVar[bool] = True
-    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself (Eq. 7)
+    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself
     needs_addressees: bool = False  # whether the half-duplex rule is the authors'
     moves_each_slot: bool = False  # whether robots move before the second broadcast too
 

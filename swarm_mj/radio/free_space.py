@@ -27,7 +27,7 @@ from swarm_mj.system.decibels import from_db
 
 @runtime_checkable
 class Channel(Protocol):
-    """Who decodes whom (f of Eq. 6): the protocol takes any of these, a plain function too.
+    """f: who decodes whom; the protocol takes any of these, a plain function too (Eq. 6).
 
     Example:
         >>> import numpy as np
@@ -91,8 +91,8 @@ def transmit_power_dbm(
 class FreeSpaceRadio:
     """The paper's channel: free-space path loss, interference of all concurrent transmitters.
 
-    Eq. 3 counts a robot's own signal as interference, so a transmitter hears nothing. The authors'
-    code exempts the addressed recipient: `recipient_hears_while_sending`. Of several packets above
+    A robot's own signal is interference to it, so a transmitter hears nothing. The authors' code
+    exempts the addressed recipient: `recipient_hears_while_sending`. Of several packets above
     the threshold, possible only below 0 dB, a robot decodes the strongest (III-B).
 
     Args:

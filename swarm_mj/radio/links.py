@@ -1,6 +1,6 @@
 """Links as a scheduler believes in them, and the receptions it predicts over them (Eqs. 3-4).
 
-A fade, an error of the belief in mean powers, or both make of the rule of Eq. 4 a probability that
+A fade, an error of the belief in mean powers, or both make of `is_received` a probability that
 rises with the margin: the SINR of the mean powers over the threshold, in dB. Index order: `i`
 sends, `j` receives.
 """

@@ -1,6 +1,6 @@
 """Mean powers from positions: transmit powers, path loss, shadowing, for compiled loops.
 
-The paper's radio is free space everywhere (Eq. 1). The other laws agree with it up to a breakpoint,
+The paper's radio is free space everywhere. The other laws agree with it up to a breakpoint,
 so a mission's transmit power means the same under each of them; beyond it, tenfold distance costs
 10 n dB. Index order: `i` sends, `j` receives.
 """

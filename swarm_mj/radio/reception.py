@@ -58,7 +58,7 @@ def is_received(ratio: float, threshold: float) -> bool:
 def may_decode(is_silent: bool, addressed: int, j: int, hears_while_sending: bool) -> bool:
     """Return whether half duplex lets robot j decode a packet that is addressed to some robot.
 
-    Eq. 3 counts a robot's own packet as interference, so a robot that is not silent hears nothing.
+    A robot's own packet is interference to it, so a robot that is not silent hears nothing.
     By the authors' code it hears what is addressed to it all the same: `hears_while_sending`.
     """
     return is_silent or (hears_while_sending and addressed == j)

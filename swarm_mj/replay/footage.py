@@ -87,7 +87,7 @@ class Footage:
     is_on: Bool[np.ndarray, "T N"]  # whether a robot had not failed
     known_age: Float[np.ndarray, "T N"]  # of what the ego robot knows [windows]; nan: nothing
     is_cut_off: Bool[np.ndarray, "T N"]  # no packets reach the ego robot, over any number of hops
-    age_mean: Float[np.ndarray, "T"]  # Eq. 10 [windows]
+    age_mean: Float[np.ndarray, "T"]  # mean over all pairs [windows]
     packets: dict[Fate, PacketPaths]  # by their fate, in the order of drawing
     mismatch: LinkMismatch  # has no snapshots in free space
     ground: Ground  # that pictures show

@@ -68,7 +68,7 @@ class Log(Footage):
     age: Float[np.ndarray, "K M M"]  # t - T^{i,j} of the robots `in_matrix` [windows]
     age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
-    velocity_variance_m2ps2: Float[np.ndarray, "T"]  # Eq. 17
+    velocity_variance_m2ps2: Float[np.ndarray, "T"]
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
     num_believed: Int[np.ndarray, "C"]  # links that policies believe in, in each snapshot
     num_working: Int[np.ndarray, "C"]  # links whose packets decode but for fades, likewise

@@ -30,8 +30,8 @@ class Summary:
     """
 
     num_windows: int
-    aoi_mean: Float[np.ndarray, "B"]  # Eq. 10 [windows]
-    velocity_variance_mean: Float[np.ndarray, "B"]  # Eq. 17 [m²/s²]
+    aoi_mean: Float[np.ndarray, "B"]  # age of information [windows]
+    velocity_variance_mean: Float[np.ndarray, "B"]  # [m²/s²]
     velocity_variance_first: Float[np.ndarray, "B"]  # after the first window [m²/s²]
     velocity_variance_last: Float[np.ndarray, "B"]  # after the last window [m²/s²]
     task_cost_name: str | None = None  # as the controller calls it; None if it has none

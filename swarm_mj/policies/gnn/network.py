@@ -1,8 +1,8 @@
 """The Aggregation GNN (III-A, Eqs. 11-14): nodes and their parents in, numbers for each node out.
 
-This is the definition: `edges_of` makes the graph, `gn_block` is Eq. 11, `mean_aggregation` Eq. 12,
-`Core` holds the perceptrons of Eq. 13, and `AggregationGnn` is Eq. 14. Nothing else needs to be
-read to know what a network computes. `gnn.fast` computes the same numbers in fewer steps, and says
+This is the definition: `edges_of` makes the graph, `gn_block` calls `mean_aggregation` and the
+perceptrons in `Core`, and `AggregationGnn` joins them. Nothing else needs to be read to know what a
+network computes. `gnn.fast` computes the same numbers in fewer steps, and says
 in one place, `FastAggregationGnn.form`, which networks it does so for.
 """
 

@@ -6,7 +6,7 @@ transmit at once: less valuable at that moment, but news then travels on many wa
 several first transmitters are followed for a few slots, and the one that leaves the team youngest
 is taken.
 
-A packet that raises T^{j,k} (Eq. 8) by r has the value r² times a weight of receiver j and subject
+A packet that raises T^{j,k} by r has the value r² times a weight of receiver j and subject
 k, times the probability that it decodes; timestamps are expected ones. Index order: `i` sends, `j`
 receives. Times are in slots, float32, which keeps them exact for 8 million windows.
 
