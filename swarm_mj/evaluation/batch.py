@@ -38,7 +38,7 @@ class Batch:
 
 @dataclass(frozen=True, kw_only=True)
 class Moment:
-    """What a window cost, and the state at its end, from which every column takes its term."""
+    """The costs of a window and the state at its end, from which every column takes its term."""
 
     window: WindowRecord
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]

@@ -94,8 +94,8 @@ def read_missions(path: Path) -> pd.DataFrame:
         twice = missions[is_twice].iloc[0]
         raise ValueError(
             f"missions {path}: the one of policy {twice['policy']} and seed {twice['seed']} is "
-            f"there more than once, as are {is_twice.sum() - 1} others, so none can be told from "
-            "its copies; write the file anew with --parquet"
+            f"there more than once, as are {is_twice.sum() - 1} others, and one cannot "
+            "say which is right; write the file anew with --parquet"
         )
     return missions
 

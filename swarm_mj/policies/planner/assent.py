@@ -1,13 +1,13 @@
-"""Whether a plan serves all, as robots tell each other, and the slots for turns while it does not.
+"""Robots tell each other whether a plan serves all; while it does not, turns have some slots.
 
 A plan may fail for ever: robots of small teams join it one by one, each in the turn of another; or
 a link that it rests on does not exist. So no plan has all slots. Every few slots belong to the
 turns of TDMA, and a robot takes its turn there unless it knows that the plan serves everyone.
 
-Each packet carries a bit of every robot: whether it hears of all lately. A robot whose bit is not
-set, or not known, is waited for. Then no state lasts in which a robot is overdue somewhere: either
-that is told to all, or those who are not told miss news themselves; so all take turns in these
-slots until the news has come. These slots visit every robot's turn, as their distance and the
+Each packet carries a bit of every robot: whether it hears of all lately. Robots wait for one whose
+bit is not set, or not known. So no state lasts in which a robot is overdue somewhere: either that
+reaches all as a bit, or those whom it does not reach miss news themselves; then all take turns in
+these slots until the news has come. The slots visit every robot's turn, as their distance and the
 number of turns have no common divisor.
 """
 
@@ -24,7 +24,7 @@ class Assent:
     """Who hears of all lately, as robots of one mission tell each other."""
 
     def __init__(self, num_robots: int, settings: PlannerSettings) -> None:
-        """Begin with nobody's assent."""
+        """Begin without any assent."""
         self._overdue = round(SLOTS_PER_WINDOW * settings.overdue_rounds * num_robots)  # [slots]
         # Of the latest slots, by their remainder: older bits are of robots that are overdue anyway.
         self._bits = np.zeros((self._overdue + 2, num_robots), dtype=np.bool_)
@@ -45,8 +45,8 @@ class Assent:
         is_fresh = since <= self._overdue
         assents = can_plan & np.all(is_fresh, axis=1)
         self._bits[slot % len(self._bits)] = assents
-        told = self._bits[(slot - since) % len(self._bits), self._everyone]
-        return np.all(told & is_fresh & (slot >= since), axis=1)
+        reported = self._bits[(slot - since) % len(self._bits), self._everyone]
+        return np.all(reported & is_fresh & (slot >= since), axis=1)
 
 
 def turns_every(num_robots: int, settings: PlannerSettings, *, learns: bool) -> int:
@@ -54,7 +54,7 @@ def turns_every(num_robots: int, settings: PlannerSettings, *, learns: bool) -> 
 
     Without a payload nobody can know that the turns are not needed, so they are rarer.
     """
-    least = settings.min_turns_every if learns else settings.min_turns_every_untold
+    least = settings.min_turns_every if learns else settings.min_turns_every_without_payload
     every = max(least, round(settings.turns_every_robots * num_robots))
     while math.gcd(every, num_robots) > 1:
         every += 1

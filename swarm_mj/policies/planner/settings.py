@@ -69,9 +69,9 @@ class PlannerSettings:
     # and seeds from 910000, of 7 to 12 robots at rest: noise, clocks, failures, walls and fades.
     min_planned_robots: int = 7  # fewer take turns only: with 6 a plan gains a tenth [robots]
     overdue_rounds: float = 2.0  # a robot not heard of for longer is overdue; N windows are one
-    min_turns_every: int = 3  # at most one slot in so many belongs to the turns [slots]
-    min_turns_every_untold: int = 8  # the same without a payload, when they never end [slots]
-    turns_every_robots: float = 0.25  # and about one in so many for each robot [slots]
+    min_turns_every: int = 3  # least distance of the slots for turns, while needed [slots]
+    min_turns_every_without_payload: int = 8  # the same where they are always needed [slots]
+    turns_every_robots: float = 0.25  # their distance is this for each robot, if that is more
 
     # Tables of links in teams at rest, chosen on four missions of 240 to 300 windows, with seeds
     # from 70000, under shadowing of 6 dB and in the arena `blocks`.
