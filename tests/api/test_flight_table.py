@@ -33,7 +33,7 @@ def summary(**numbers):
 
 def shown(policy_name, task, its):
     """The table's rows as a mapping, and all its text."""
-    mission = paper(task, num_robots=6)
+    mission = paper(task, num_robots=7)
     policy = make_policy(policy_name, mission)
     numbers = flight_numbers(mission, policy, its) | {"heard_share": 0.254}
     rows = flight_rows(mission, numbers, 1.5)

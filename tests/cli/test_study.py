@@ -136,18 +136,19 @@ def test_a_file_that_is_nested_deep_is_refused(refusal, tmp_path, text):
 
 
 EVIL = {  # where a study may name code
-    "policy": "[study]\npolicies = ['evil:Mine']",
-    "features": "[study]\npolicies = ['gnn']\nfeatures = 'evil:Mine'",
-    "channel": "[study.components]\nchannel = 'evil:Mine'",
-    "controller": "[study.components]\ncontroller = 'evil:Mine'",
-    "scene": "[study.components]\nscene = 'evil:Mine'",
+    "policy": "policies = ['evil:Mine']",
+    "features": "policies = ['gnn']\nfeatures = 'evil:Mine'",
+    "channel": "policies = ['tdma']\ncomponents.channel = 'evil:Mine'",
+    "controller": "policies = ['tdma']\ncomponents.controller = 'evil:Mine'",
+    "scene": "policies = ['tdma']\ncomponents.scene = 'evil:Mine'",
 }
+BRIEF = "[mission]\nnum_robots = 3\nnum_windows = 2\n[study]\nepisodes = 1\n"
 
 
 @pytest.mark.parametrize("kind", EVIL)
 def test_code_that_a_file_names_is_run_only_if_it_is_trusted(refusal, swarm_mj, tmp_path, kind):
     (tmp_path / "evil.py").write_text("open('sprung', 'w').write('run')\nMine = None\n")
-    (tmp_path / "s.toml").write_text(EVIL[kind])
+    (tmp_path / "s.toml").write_text(BRIEF + EVIL[kind])
     said = refusal("study", "run", "s.toml")
     assert said.startswith("swarm-mj: error: study s.toml: it runs someone's own evil:Mine; ")
     assert said.endswith("if you trust that code, give --trust")

@@ -76,7 +76,7 @@ def test_every_class_says_all_of_itself(kind):
     assert summary.endswith(".")
     assert kind.payload == about.payload_name
     # Fields without a name and a meaning, or the other way round, would be carried in silence.
-    rest = paper("stationary", num_robots=4)
+    rest = paper("stationary", num_robots=8)
     assert bool(make_policy(about.name, rest).payload_fields(rest)) == (about.payload is not None)
     makes = kind.with_probability if issubclass(kind, RandomTransmission) else kind.for_mission
     assert makes.__func__ is not Policy.for_mission.__func__
