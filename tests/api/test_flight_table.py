@@ -68,8 +68,8 @@ ROWS = [  # policy, task, numbers, and the rows that they make
             "lost": "150 (75%)",
             "answered, and the answer heard": "40 (20%)",
             "overheard by other robots": "600 times",
-            # Header 3 and 6 entries of 9 are 57 bytes; 250 of them in 10 s are 11.4 kbit/s.
-            "bytes each; sent by the team": "57; 11.4 kbit/s",
+            # Header 3 and 7 entries of 9 are 66 bytes; 250 of them in 10 s are 13.2 kbit/s.
+            "bytes each; sent by the team": "66; 13.2 kbit/s",
         },
     ),
     (
