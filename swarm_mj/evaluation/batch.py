@@ -12,7 +12,7 @@ from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.costs import WindowCosts
+from swarm_mj.protocol.costs import Packets, WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -41,6 +41,7 @@ class Moment:
     """The costs of a window and the state at its end, from which every column takes its term."""
 
     window: WindowRecord
+    packets: Packets  # the window's, taken once for all columns that count them
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     now: Float[np.ndarray, "B"]  # t [windows]
     is_active: Bool[np.ndarray, "B N"]
@@ -134,15 +135,15 @@ class BatchCosts:
     # Everyone had first heard of everyone [windows]; nan: never.
     complete_window: Float[np.ndarray, "B"] = _first(lambda at: at.completed_at)
     # Requests or broadcasts.
-    packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.sent)
+    packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.packets.sent)
     # All that were on the air, responses too.
-    packets_transmitted: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.transmitted)
+    packets_transmitted: Float[np.ndarray, "B"] = _total(lambda at: at.packets.transmitted)
     # Requests that their addressee decoded.
-    packets_delivered: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.delivered)
+    packets_delivered: Float[np.ndarray, "B"] = _total(lambda at: at.packets.delivered)
     # Broadcasts that at least one robot decoded.
-    packets_heard: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.heard)
+    packets_heard: Float[np.ndarray, "B"] = _total(lambda at: at.packets.heard)
     # Times that a robot decoded a broadcast.
-    packets_receptions: Float[np.ndarray, "B"] = _total(lambda at: at.costs.packets.receptions)
+    packets_receptions: Float[np.ndarray, "B"] = _total(lambda at: at.packets.receptions)
     # Over all missions: how often a robot's knowledge of another had each age, in slots, from 0 to
     # the mission's length.
     ages: Int[np.ndarray, "bins"]
@@ -217,6 +218,7 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
             floor = connectivity_floor(shared, states.position_m, mission.range_m, now, is_active)
         yield Moment(
             window=window,
+            packets=window.costs.packets,
             timestamp=swarm.buffers.timestamp,
             now=now,
             is_active=is_active,
