@@ -20,6 +20,9 @@ from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import Meaning, about_of
 
 Value = TypeVar("Value")
+# What was typed, by the places of the options. Each value is of its option's type, which the parser
+# has seen to and no type checker can know.
+Given = dict[str, Any]
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
@@ -115,12 +118,10 @@ class Nested:
     """A field that several options fill."""
 
     options: Callable[[], Iterable[Option]]
-    build: Callable[[dict[str, Any]], Any]
+    build: Callable[[Given], Any]
 
 
-def nested(
-    options: Callable[[], Iterable[Option]], build: Callable[[dict[str, Any]], Value]
-) -> Value:
+def nested(options: Callable[[], Iterable[Option]], build: Callable[[Given], Value]) -> Value:
     """Return a field that several options fill; type checkers take it for what `build` makes.
 
     Args:
@@ -140,7 +141,7 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
     """
     _check_names(arguments)
     parsed = vars(_parser_of(kind, prog, summary).known(arguments))
-    given: dict[str, Any] = {"typed": tuple(arguments)}
+    given: Given = {"typed": tuple(arguments)}
     given |= {name: tuple(x) if isinstance(x, list) else x for name, x in parsed.items()}
     specs = fields(kind)
     values = {spec.name: given[spec.name] for spec in specs if spec.name in given}

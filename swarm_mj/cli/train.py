@@ -3,13 +3,13 @@
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, get_args
+from typing import ClassVar, get_args
 
 from rich.console import Console
 
 from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags
-from swarm_mj.cli.options import nested
+from swarm_mj.cli.options import Given, nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.learning import run_folder
 from swarm_mj.learning.run_folder import Limits, TrainingRun
@@ -51,7 +51,7 @@ class TrainOptions:
         None, "begin with a stored policy", metavar="POLICY", reads=the_file
     )
     yes: bool = setting(False, YES)
-    settings: dict[str, Any] = nested(train_settings.setting_options, train_settings.given_settings)
+    settings: Given = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()
 
 

@@ -168,7 +168,7 @@ class Result:
     config: str = column(lambda own: own.config)
 
 
-def computation(spec: Field[Any]) -> Callable[[Measurements], object]:
+def computation(spec: Field[object]) -> Callable[[Measurements], object]:
     """Return how a column is computed; raise TypeError for one that nothing computes."""
     if HOW not in spec.metadata:
         raise TypeError(
