@@ -95,11 +95,13 @@ def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
 
     def window_us(**world: Any) -> tuple[float, float]:
         """Return a window, and of it what MuJoCo takes."""
-        swarm, policy = Swarm(replace(MISSION, **world), range(num_missions)), RoundRobin()
+        swarm = Swarm(replace(MISSION, **world), range(num_missions))
+        policy = RoundRobin()
         whole_us = microseconds(lambda: swarm.step(policy), seconds / 2)
         return whole_us / num_missions, microseconds(swarm.move, seconds / 4) / num_missions
 
-    (exact_us, _), (faded_us, _) = window_us(), window_us(fading="rayleigh")
+    exact_us, _ = window_us()
+    faded_us, _ = window_us(fading="rayleigh")
     yield Row("free space", exact_us)
     yield Row("Rayleigh fading", faded_us)
     yield Row("  times free space", faded_us / exact_us, "{:.2f}", ends_section=True)
@@ -188,7 +190,14 @@ def growth(teams: Mapping[str, Sequence[Row]], name: str) -> tuple[float, float]
 
 def _values(teams: Mapping[str, Sequence[Row]], name: str) -> Float[np.ndarray, "2 T"]:
     """Return the sizes of teams, and their values in a row."""
-    return np.array([(int(n), row.value) for n in teams for row in teams[n] if row.name == name]).T
+    numbers: list[int] = []
+    values: list[float] = []
+    for number, rows in teams.items():
+        for row in rows:
+            if row.name == name:
+                numbers.append(int(number))
+                values.append(row.value)
+    return np.array([numbers, values], dtype=np.float64)
 
 
 def draw_teams(teams: Mapping[str, Sequence[Row]], path: Path) -> None:
@@ -201,7 +210,8 @@ def draw_teams(teams: Mapping[str, Sequence[Row]], path: Path) -> None:
     with styled():
         figure = Figure(figsize=(7.5, 3.0), layout="constrained")
         for axes, name in zip(figure.subplots(1, 2), GROWING, strict=True):
-            (numbers, values), (power, factor) = _values(teams, name), growth(teams, name)
+            numbers, values = _values(teams, name)
+            power, factor = growth(teams, name)
             fitted = numbers[-NUM_FITTED:]
             axes.loglog(fitted, factor * fitted**power, color=look.colour)
             axes.loglog(numbers, values, look.marker, color=look.colour)

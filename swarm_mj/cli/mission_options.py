@@ -126,7 +126,8 @@ def check_in_use(
         if switch is None or spec.name not in given:
             continue
         if not any(switch.is_on(mission) for mission in missions):
-            own, other = called(spec.name), called(switch.name)
+            own = called(spec.name)
+            other = called(switch.name)
             ways = f"give that too, or leave {own} out"
             raise ValueError(f"{own} counts only with {other} {switch.state or 'above 0'}; {ways}")
 

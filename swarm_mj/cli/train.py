@@ -112,7 +112,8 @@ def _begun_run(options: TrainOptions) -> TrainingRun:
 
 def _new_run(options: TrainOptions) -> TrainingRun:
     run_folder.check_new(options.out)
-    init, given = options.init, options.settings
+    init = options.init
+    given = options.settings
     training = train_settings.asked_settings(given, read_policy(init)[1] if init else None, init)
     credit = training.credit_assignment
     limits = Limits(decisions=run_folder.BUDGETS[credit], patience=run_folder.PATIENCE[credit])
@@ -124,13 +125,18 @@ def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
     """Return a run's limits, changed by the options that were given."""
     if options.budget is not None or options.minutes is not None:  # either replaces both
         limits = replace(limits, decisions=options.budget, minutes=options.minutes)
-    others = {"patience": options.patience, "replay_every": options.replay_every}
-    return replace(limits, **{name: x for name, x in others.items() if x is not None})
+    if options.patience is not None:
+        limits = replace(limits, patience=options.patience)
+    if options.replay_every is not None:
+        limits = replace(limits, replay_every=options.replay_every)
+    return limits
 
 
 def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) -> None:
-    training, console = asked.training, plain_console()
-    credit, sizes = training.credit_assignment, ", ".join(map(str, training.robots))
+    training = asked.training
+    console = plain_console()
+    credit = training.credit_assignment
+    sizes = ", ".join(map(str, training.robots))
     rows = {
         **report(asked, progress),
         "decisions": f"{progress.decisions:,}",

@@ -121,7 +121,10 @@ def _begun_with(training: Training, init: GnnConfig, policy: str, given: Given) 
         features=init.features,
         silence_logit=init.silence_logit,
     )
-    of_network = {at: x for at, x in given.items() if at.startswith(("features", "network"))}
+    of_network: Given = {}
+    for place, value in given.items():
+        if place.startswith(("features", "network")):
+            of_network[place] = value
     refuse_others(of_network, training, f"the {policy}")
     check_named(init.features, own_names(given), policy)
     return training
