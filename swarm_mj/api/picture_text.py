@@ -1,4 +1,4 @@
-"""What is written beside a picture's map: the title, the time, the ramp of ages and the legend."""
+"""The words beside a picture's map: the title, the time, the ramp of ages and the legend."""
 
 import textwrap
 from typing import NamedTuple

@@ -66,7 +66,7 @@ class PolicyOptions(Components):
 
     @property
     def arguments(self) -> PolicyArguments:
-        """What changes the policy."""
+        """The arguments that change the policy."""
         return PolicyArguments(
             probability=self.probability,
             is_deterministic=self.is_deterministic,

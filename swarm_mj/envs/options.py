@@ -25,7 +25,7 @@ from swarm_mj.system.fields import check_choice
 
 
 class RobotTruth(NamedTuple):
-    """What `truth` says of each robot, in this order; all is normalised, and has no unit."""
+    """The numbers of each robot in `truth`, in this order; all is normalised, and has no unit."""
 
     position: Float[np.ndarray, "B N 2"]  # by half the side of the area
     velocity: Float[np.ndarray, "B N 2"]  # by the maximum

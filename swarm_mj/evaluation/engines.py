@@ -173,7 +173,7 @@ class Slurm:
 
 @runtime_checkable
 class SlurmJob(Protocol[Product]):
-    """What is used of a job of submitit's."""
+    """A job of submitit's, as far as it is used here."""
 
     def exception(self) -> Exception | None:
         """Return why the job failed, if it did."""

@@ -1,4 +1,4 @@
-"""What changes a policy that is made by its name, in one struct that is passed on whole."""
+"""The arguments that change a policy made by its name, in one struct that is passed on whole."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""What robots at rest observe of their links: kinds of packets that they decoded or missed.
+"""Observations of links by robots at rest: kinds of packets that they decoded or missed.
 
 A kind is the packet's outcome, its sender, and the bin of the margin with which it was expected.
 """
