@@ -21,7 +21,8 @@ from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.specification import OPEN, SQUARE_METRES_PER_KM2
+from swarm_mj.mission.surroundings import OPEN
+from swarm_mj.mission.team import SQUARE_METRES_PER_KM2
 from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
 from swarm_mj.system.decibels import from_db
 from swarm_mj.system.fields import did_you_mean

@@ -82,7 +82,8 @@ class PathLoss(
     the direct ray (both: Rappaport 2002).
     """
 
-    # To add a law, name it in `PathLossLaw` and its parameters in `Mission`; here it gets a case.
+    # To add a law, name it in `PathLossLaw` and its parameters in `mission.surroundings`; here it
+    # gets a case.
     breakpoint_m: float  # up to which free space holds
     exponent: float  # n, beyond it: tenfold distance costs 10 n dB
 

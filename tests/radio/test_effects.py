@@ -13,7 +13,7 @@ from declared import where_class, where_field
 from walls import walls
 
 from swarm_mj.mission import Mission, paper
-from swarm_mj.mission.specification import FadingLaw, PathLossLaw
+from swarm_mj.mission.surroundings import FadingLaw, PathLossLaw
 from swarm_mj.policies.carrier_sense import sensed_dbm
 from swarm_mj.protocol.packets import slot_bytes
 from swarm_mj.radio.effects import (
