@@ -92,7 +92,7 @@ FOR_THE_TYPE_CHECKER = [
     ),
     Mistake(
         name="an arena whose material has no loss",
-        file="swarm_mj/physics/arenas.py",
+        file="swarm_mj/physics/materials.py",
         before='TREE = Material(\n    name="tree",\n    loss_db=6.0,',
         after='TREE = Material(\n    name="tree",',
         said='Argument missing for parameter "loss_db"',
@@ -233,8 +233,8 @@ FOR_TESTS = [
     Mistake(
         name="an effect that is left out of the list",
         file="swarm_mj/radio/effects.py",
-        before="tuple(MissionEffect.__subclasses__())",
-        after="(PathLoss, Shadowing, Fading, Bursts, HighPower, Clocks)",
+        before="    Erasure,\n",
+        after="",
         caught_by=f"{EFFECTS}::test_every_number_of_the_channel_is_read_once",
         said=r"swarm_mj/mission/impairments\.py:\d+: erasure is read by no effect",
     ),

@@ -15,14 +15,15 @@ from rich.table import Table
 from swarm_mj.api.flight_summary import FlightSummary, as_lines
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.costs import PACKET_COUNTS
 from swarm_mj.protocol.mission_costs import AOI, MISSION_COSTS
-from swarm_mj.replay.recorder import Log
+from swarm_mj.protocol.packet_counts import PACKET_COUNTS
+from swarm_mj.replay.log import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system import terminal
-from swarm_mj.system.fields import as_typed, did_you_mean
+from swarm_mj.system.arguments import did_you_mean
+from swarm_mj.system.fields import as_typed
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import is_notebook
 from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv, write_json

@@ -89,6 +89,11 @@ def test_every_number_of_the_channel_is_read_once():
     assert {"position_noise_m", "position_noise_s"} <= NOISE
 
 
+def test_no_effect_is_left_out():
+    for effect in MissionEffect.__subclasses__():
+        assert effect in EFFECTS, f"{where_class(effect)}: {effect.__name__} is not in EFFECTS"
+
+
 @pytest.mark.parametrize("effect", EFFECTS)
 def test_an_effect_reads_what_it_says(effect):
     assert {*effect.reads} == READERS[effect.__name__] & {*CHANNEL_FIELDS}
