@@ -90,7 +90,8 @@ def imports(path):
     ("name", "known"),
     [
         ("system/compiled", {"system.interrupt"}),
-        ("system/fields", set()),
+        ("system/arguments", set()),
+        ("system/fields", {"system.arguments"}),
         ("mission/team", {"system.fields"}),
         ("mission/transceiver", {"system.fields", "mission.labels"}),
         ("mission/faults", {"system.fields", "mission.labels", "mission.team"}),

@@ -3,7 +3,7 @@
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from swarm_mj.system.fields import did_you_mean
+from swarm_mj.system.arguments import did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

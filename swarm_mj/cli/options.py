@@ -16,6 +16,7 @@ from types import MappingProxyType
 from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.system import fields as settings
+from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import Meaning, about_of
 
@@ -55,7 +56,7 @@ class Parser(argparse.ArgumentParser):
         parsed, left = self.parse_known_args(arguments)
         if left:
             flags = [flag for action in self._actions for flag in action.option_strings]
-            hint = settings.did_you_mean(left[0].partition("=")[0], flags)
+            hint = did_you_mean(left[0].partition("=")[0], flags)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
 

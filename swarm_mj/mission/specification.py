@@ -17,7 +17,8 @@ from swarm_mj.mission.knowledge import NOTHING, Grant, Knowledge, in_order
 from swarm_mj.mission.surroundings import OPEN, Surroundings
 from swarm_mj.mission.team import Team
 from swarm_mj.mission.transceiver import Transceiver
-from swarm_mj.system.fields import check, check_names, former_names
+from swarm_mj.system.arguments import check_names
+from swarm_mj.system.fields import check, former_names
 
 
 # A dataclass has its bases' fields from the last base to the first: the team's come first.
