@@ -5,7 +5,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.replay import palette, recorder
+from swarm_mj.replay import palette, recorder, replay_size
 from swarm_mj.replay.links import radio_snapshot
 from swarm_mj.replay.recorder import Recorder, moment
 from swarm_mj.simulation.rollout import rollout
