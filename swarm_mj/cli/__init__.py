@@ -103,7 +103,7 @@ def script(
 def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
     """Print the overview or the version, or refuse a line that names no command."""
     from swarm_mj.cli.options import Parser
-    from swarm_mj.system.fields import did_you_mean
+    from swarm_mj.system.arguments import did_you_mean
     from swarm_mj.system.packages import version
 
     begin_with = {f"{NAME} {command}": meaning for command, meaning in BEGINNING.items()}

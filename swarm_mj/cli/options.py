@@ -17,6 +17,7 @@ from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.cli.option_values import CONVERT
 from swarm_mj.system import fields as settings
+from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import Meaning, about_of
 
@@ -61,7 +62,7 @@ class Parser(argparse.ArgumentParser):
             flags: list[str] = []
             for action in self._actions:
                 flags.extend(action.option_strings)
-            hint = settings.did_you_mean(left[0].partition("=")[0], flags)
+            hint = did_you_mean(left[0].partition("=")[0], flags)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
 

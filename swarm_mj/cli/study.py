@@ -13,8 +13,9 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
 from swarm_mj.simulation.components import TABLE, Components
+from swarm_mj.system.arguments import check_kind, check_names, did_you_mean
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import check_kind, check_names, did_you_mean, former_names, setting
+from swarm_mj.system.fields import former_names, setting
 from swarm_mj.system.packages import asset, need
 from swarm_mj.system.reading import read_file
 from swarm_mj.system.terminal import plain_console

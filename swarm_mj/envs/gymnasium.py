@@ -20,7 +20,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
 from swarm_mj.replay.view import has_display
-from swarm_mj.system.fields import check_choice
+from swarm_mj.system.arguments import check_choice
 
 MODES = ("rgb_array", "human")
 WIDTH = 800  # of a picture [pixels]

@@ -19,7 +19,7 @@ from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or
 from swarm_mj.envs.options import BatchOptions, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set
-from swarm_mj.system.fields import check_names
+from swarm_mj.system.arguments import check_names
 
 MODES = ("rgb_array",)  # a window on the screen would show one mission of many
 

@@ -15,13 +15,9 @@ from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
-from swarm_mj.protocol.costs import (
-    WindowCosts,
-    age_of_information,
-    no_packets,
-    velocity_variance,
-)
+from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.protocol.mission_costs import AOI, BY_REWARD, TASK_COST, VELOCITY_VARIANCE
+from swarm_mj.protocol.packet_counts import no_packets
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
 

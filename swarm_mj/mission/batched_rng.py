@@ -70,7 +70,8 @@ class Stream:
     def __init__(
         self, rngs: Sequence[np.random.Generator], draw: Draw, shape: tuple[int, ...]
     ) -> None:
-        self._rngs, self._draw = rngs, draw
+        self._rngs = rngs
+        self._draw = draw
         self._block = np.empty((BLOCK, len(rngs), *shape))
         self._next = BLOCK
 

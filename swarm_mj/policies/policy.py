@@ -12,7 +12,8 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.about import About
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
-from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, RequestResponse, WindowProtocol
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.protocol.window_protocols import DoubleBroadcast, RequestResponse, WindowProtocol
 from swarm_mj.radio.mission_radio import Belief, TrueLinks
 
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name

@@ -24,7 +24,7 @@ from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.system.fields import check_kind, did_you_mean, unwrapped
+from swarm_mj.system.arguments import check_kind, did_you_mean, unwrapped
 from swarm_mj.system.packages import asset, need
 from swarm_mj.system.user_code import files_named, is_own, make
 

@@ -8,8 +8,8 @@ from jaxtyping import Float, Int
 
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.radio.free_space import Channel
+from swarm_mj.system.arguments import name_of
 from swarm_mj.system.compiled import compiled
-from swarm_mj.system.fields import name_of
 from swarm_mj.system.user_code import is_ours
 
 

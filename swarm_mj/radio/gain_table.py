@@ -47,9 +47,11 @@ class GainTable(ComposedChannel):
         if len(rows) < NUM_NEAREST or not np.all(np.isfinite(rows)):
             least = f"{NUM_NEAREST} rows of finite numbers or more, with -150 dB for no link"
             raise ValueError(f"a table of gains has a first line {HEADER}, then {least}")
-        ends_m = rows[:, :4]
-        received_mw = radio.power_mw * from_db(rows[:, 4])
-        apart_m = np.maximum(np.hypot(*(ends_m[:, :2] - ends_m[:, 2:]).T), MIN_DISTANCE_M)
+        from_x_m, from_y_m, to_x_m, to_y_m, gain_db = rows.T
+        ends_m = np.column_stack([from_x_m, from_y_m, to_x_m, to_y_m])
+        received_mw = radio.power_mw * from_db(gain_db)
+        distance_m = np.hypot(from_x_m - to_x_m, from_y_m - to_y_m)
+        apart_m = np.maximum(distance_m, MIN_DISTANCE_M)
         beyond_db = to_db(received_mw * apart_m**2 / radio.received_at_1_m_mw)
         # Every pair in both directions: the same numbers with its ends exchanged.
         self._beyond_db = np.tile(beyond_db, 2)

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.checks import check_robots
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS

@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import Packets, TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.packet_counts import Packets
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.fields import check_kind
+from swarm_mj.system.arguments import check_kind
 
 
 @dataclass(frozen=True, kw_only=True)

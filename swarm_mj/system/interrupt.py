@@ -66,7 +66,8 @@ def deferred_interrupt() -> Iterator[Callable[[], bool]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         nonlocal was_pressed
-        is_first, was_pressed = not was_pressed, True
+        is_first = not was_pressed
+        was_pressed = True
         # A terminal that is closed hangs up more than once, so a hang-up is never the second.
         if not is_first and number != signal.SIGHUP:
             signal.default_int_handler(number, frame)

@@ -1,6 +1,6 @@
 """Memory and disk: whether this machine has left what a command needs, asked before the work.
 
-What is needed, those know who fill it: `simulation.memory`, `replay.recorder`, `learning`.
+What is needed, those know who fill it: `simulation.memory`, `replay.replay_size`, `learning`.
 """
 
 import math

@@ -48,7 +48,8 @@ def tell_cores(number: int, what: str = "jobs") -> None:
 def named_values(title: str, rows: dict[str, str], caption: str | None = None) -> Table:
     """Return a table of values beside their names."""
     table = Table(title=title, title_justify="left", show_header=False)
-    table.caption, table.caption_justify = caption, "left"
+    table.caption = caption
+    table.caption_justify = "left"
     for name, value in rows.items():
         table.add_row(name, value)
     return table
@@ -76,7 +77,8 @@ class WorkBar:
         console: Console | None = None,
     ) -> None:
         """Prepare the bar, on standard error by default; without a unit, it shows no numbers."""
-        self.what, self.text = what, ""
+        self.what = what
+        self.text = ""
         console = console or Console(stderr=True, highlight=False)
         count = f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"
         self._bar = Progress(

@@ -11,15 +11,9 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import PRESETS, paper, reference
-from swarm_mj.physics.arenas import (
-    ARENAS,
-    DEFAULT_LOSS_DB,
-    MATERIALS,
-    OBSTACLE_GROUP,
-    notes_on,
-    obstacle_geoms,
-    obstacles_of,
-)
+from swarm_mj.physics.arenas import ARENAS, notes_on
+from swarm_mj.physics.materials import DEFAULT_LOSS_DB, MATERIALS
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP, obstacle_geoms, obstacles_of
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import BOX, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, SPHERE
 from swarm_mj.policies import make_policy
