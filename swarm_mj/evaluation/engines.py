@@ -107,7 +107,7 @@ class Ray:
             with deferred_interrupt() as is_interrupted, TemporaryDirectory() as parts:
                 _copy_parts(parts, self.files)
                 how["runtime_env"] = {"working_dir": parts, "env_vars": SURROUNDINGS}
-                ray.init(**how, logging_level="ERROR", log_to_driver=False)
+                _start_ray(ray, how)
             if is_interrupted():
                 raise KeyboardInterrupt
             do = ray.remote(max_retries=-1)(_do)
@@ -124,9 +124,17 @@ class Ray:
                 done, tasks = ray.wait(tasks)
                 yield from _unpacked(ray.get(done[0]))
         except (ray.exceptions.RayError, RuntimeError) as error:
-            raise OSError(f"Ray gave up: {str(error).strip()}") from error
+            raise OSError(f"Ray gave up: {' '.join(str(error).split())}") from error
         finally:
             ray.shutdown()
+
+
+def _start_ray(ray: Any, how: dict[str, Any]) -> None:  # noqa: ANN401 - a module
+    """Start Ray, or join one; raise OSError in one line if that cannot be."""
+    try:
+        ray.init(**how, logging_level="ERROR", log_to_driver=False)
+    except Exception as error:  # Ray raises that very class, among others
+        raise OSError(f"Ray did not start: {' '.join(str(error).split())}") from error
 
 
 @dataclass(frozen=True, kw_only=True)
