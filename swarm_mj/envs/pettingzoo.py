@@ -13,7 +13,7 @@ from swarm_mj.envs.gymnasium import MODES, Screen, modes_here, rendering
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import BatchOptions, make_batch, robot_spaces, truth, truth_space
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.checks import checked_robots
+from swarm_mj.protocol.checks import as_array, checked_robots
 from swarm_mj.system.fields import check_kind
 
 Action = int | np.integer[Any]
@@ -150,7 +150,7 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
                 names = f"{self.possible_agents[0]} to {self.possible_agents[-1]}"
                 raise ValueError(f"agents are {names}, not {agent!r:.80}; leave it out")
             if agent in self.agents:
-                chosen[self._robot[agent]] = np.squeeze(action)  # some wrap it
+                chosen[self._robot[agent]] = as_array("action", action).squeeze()  # some wrap it
         if not self.agents:
             return {}, {}, {}, {}, {}
         recipient = checked_robots("action", [chosen], self.batch.shape)
