@@ -18,7 +18,7 @@ from jaxtyping import Int
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
-from swarm_mj.protocol.checks import check_robots
+from swarm_mj.protocol.checks import as_array, checked_robots
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.swarm import Swarm
 
@@ -118,9 +118,9 @@ class SwarmTask(_Task):
 
     def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
         """Set each robot's recipient, itself for silence; raise ValueError for other actions."""
-        recipient = np.asarray(action)[np.newaxis]
-        check_robots("recipient", recipient, (1, physics.swarm.mission.num_robots))
-        physics.recipient = recipient.astype(np.int64)
+        shape = (1, physics.swarm.mission.num_robots)
+        recipient = as_array("recipient", action)[np.newaxis]
+        physics.recipient = checked_robots("recipient", recipient, shape).copy()
 
     def action_spec(self, physics: SwarmPhysics) -> specs.BoundedArray:
         """Return the recipient of each robot, shape (N,), from 0 to N - 1."""

@@ -98,7 +98,10 @@ class Components:
                     f"{beyond_free_space(mission)} would change nothing; leave out one of them"
                 )
             try:
-                made = replace(made, **{kind: _made(kind, name, mission)})
+                part = _made(kind, name, mission)
+                if part is None or isinstance(part, str):  # which else stand for what is not made
+                    check_callable(kind, part, CALLED_WITH[kind])
+                made = replace(made, **{kind: part})
             except TypeError as error:
                 raise ValueError(f"{kind} {name}: {error}") from error
         return made

@@ -95,8 +95,12 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
 
     Raises:
         ValueError: If no window was flown.
+        TypeError: If they are no windows.
     """
+    check_kind("flown", flown, Iterable, "rollout(swarm, policy)")
     flown = list(flown)
+    for window in flown:
+        check_kind("each window", window, WindowRecord, "those of rollout(swarm, policy)")
     if not flown:
         raise ValueError("a summary needs at least 1 window flown, not 0")
     variance = [window.costs.velocity_variance_m2ps2 for window in flown]

@@ -17,7 +17,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
-from swarm_mj.protocol.checks import check_robots
+from swarm_mj.protocol.checks import checked_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
 from swarm_mj.protocol.packets import fitting, packet_of, with_room
 from swarm_mj.protocol.talk import talk_over
@@ -316,14 +316,14 @@ class Swarm:
         decide: Callable[[], Int[np.ndarray, "B N"]],
         start: Float[np.ndarray, "B"],
         phases: tuple[Phase, ...],
-    ) -> np.ndarray:
+    ) -> Int[np.ndarray, "B N"]:
         """Return the recipients in the slot after these."""
         if phases:  # a later slot is decided by its own clock, and knows the earlier one
             self.phases = phases
             self.now = start + len(phases) * SLOT_WINDOWS
-        recipient = np.asarray(decide())
-        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=self.is_broadcast)
-        return recipient
+        return checked_robots(
+            "recipient", decide(), self.buffers.shape, may_broadcast=self.is_broadcast
+        )
 
     def task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost.

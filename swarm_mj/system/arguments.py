@@ -97,4 +97,4 @@ def _shown(value: object) -> str:
     """Return a wrong argument, and what to do about a class in place of its object."""
     if isinstance(value, type):
         return f"the class {value.__name__}; make an object of it, {value.__name__}(...)"
-    return f"{value!r:.80}"
+    return f"{' '.join(repr(value).split()):.80}"  # an array takes several lines

@@ -16,6 +16,7 @@ from typing import Annotated, Any, BinaryIO, TypeVar
 import msgspec
 
 from swarm_mj.system.fields import former_names
+from swarm_mj.system.streams import check_printable
 
 Kind = TypeVar("Kind")
 Row = tuple[int, dict[str, str]]
@@ -63,7 +64,16 @@ def read_rows(path: Path, what: str, most_bytes: int) -> list[Row]:
     for line, row in rows:
         if None in row or None in row.values():
             raise ValueError(f"{what} {path}, line {line}: as many cells as columns are needed")
+        for cell in (*row, *row.values()):
+            _check_cell(f"{what} {path}, line {line}", cell)
     return rows
+
+
+def _check_cell(where: str, cell: str) -> None:
+    try:
+        check_printable(cell, "write it without them")
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
 
 
 def read_json(text: bytes | str, kind: type[Kind]) -> Kind:
