@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from itertools import islice
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Protocol, runtime_checkable
@@ -38,6 +38,9 @@ SURROUNDINGS |= {"MUJOCO_GL": "disable", SAFE_PATH: "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 GROUP: dict[str, Any] = {"group": "processes that fly missions"}
+HAS_MASKS = hasattr(signal, "pthread_sigmask")  # Windows has none, and no resource tracker
+if HAS_MASKS:
+    from multiprocessing import resource_tracker
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
 
@@ -244,12 +247,14 @@ def _inherited() -> Iterator[None]:
     """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
     before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
-    resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
-    mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    if HAS_MASKS:
+        resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
+        mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        if HAS_MASKS:
+            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for name in SURROUNDINGS.keys() - before.keys():
             del os.environ[name]
         os.environ.update(before)
