@@ -151,6 +151,7 @@ def attempt(install: Install, wheel: Path) -> str:
         steps = [[str(UV), "venv", "--quiet", "--python", sys.executable, str(python.parents[1])]]
         steps += commands(install, python, wheel)
         steps.append([str(python), "-P", "-c", install.program])
+        said = ""
         for step in steps:
             # `--group` reads the pyproject.toml of the folder it runs in.
             place = ROOT if "--group" in step else Path(folder)

@@ -38,9 +38,6 @@ SURROUNDINGS |= {"MUJOCO_GL": "disable", SAFE_PATH: "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
 GROUP: dict[str, Any] = {"group": "processes that fly missions"}
-HAS_MASKS = hasattr(signal, "pthread_sigmask")  # Windows has none, and no resource tracker
-if HAS_MASKS:
-    from multiprocessing import resource_tracker
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
 
@@ -247,14 +244,26 @@ def _inherited() -> Iterator[None]:
     """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
     before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
-    if HAS_MASKS:
-        resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
-        mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
-        yield
+        with _masked():
+            yield
     finally:
-        if HAS_MASKS:
-            signal.pthread_sigmask(signal.SIG_SETMASK, mask)
         for name in SURROUNDINGS.keys() - before.keys():
             del os.environ[name]
         os.environ.update(before)
+
+
+@contextmanager
+def _masked() -> Iterator[None]:
+    """Let processes that are started meanwhile inherit a mask against Ctrl-C, if there are any."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows, which has no resource tracker either
+        yield
+        return
+    from multiprocessing import resource_tracker
+
+    resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)

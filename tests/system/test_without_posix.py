@@ -12,7 +12,7 @@ from swarm_mj.system.processes import PYTHON
 
 # Before any module of the package: libraries keep what they take at their import.
 WITHOUT = """
-import os, signal, subprocess, sys
+import os, signal, subprocess, sys, types
 import multiprocessing.popen_spawn_posix, multiprocessing.resource_tracker
 import filelock, psutil, torch
 for name in ("fcntl", "resource", "termios", "pwd", "grp"):
@@ -25,10 +25,13 @@ for module, names in (
         if hasattr(module, name):
             delattr(module, name)
 # Libraries need these on Linux: the package alone does not find them.
-nonblock, cloexec, mask = os.O_NONBLOCK, os.O_CLOEXEC, signal.pthread_sigmask
-del os.O_NONBLOCK, os.O_CLOEXEC, signal.pthread_sigmask
+nonblock, cloexec = os.O_NONBLOCK, os.O_CLOEXEC
+del os.O_NONBLOCK, os.O_CLOEXEC
 import swarm_mj.evaluation.engines, swarm_mj.system.reading
-os.O_NONBLOCK, os.O_CLOEXEC, signal.pthread_sigmask = nonblock, cloexec, mask
+os.O_NONBLOCK, os.O_CLOEXEC = nonblock, cloexec
+masks = types.SimpleNamespace(**vars(signal))
+del masks.pthread_sigmask
+swarm_mj.evaluation.engines.signal = masks
 start = subprocess.Popen.__init__
 def without_a_shell(self, command, *rest, **how):
     if command and command[0] == "sh":
