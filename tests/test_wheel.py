@@ -118,7 +118,7 @@ import json, sys
 import swarm_mj
 run = swarm_mj.fly(record=False)
 urban = swarm_mj.fly(preset="urban", num_robots=10, num_windows=50, record=False)
-swarm_mj.evaluate("tdma", preset="urban", num_robots=10, num_windows=50, episodes=2)
+swarm_mj.evaluate("tdma", preset="urban", num_robots=10, num_windows=50, num_missions=2)
 told = []
 for work in (run.to_dataframe, run.plot, lambda: swarm_mj.fly(policy="gnn")):
     try:
