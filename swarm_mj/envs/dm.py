@@ -6,6 +6,7 @@ seen in a picture, and are overwritten at the next window.
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -53,6 +54,7 @@ def make_environment(
         ValueError: As `Swarm` does: if the seed is out of range, or if no connected team could be
             drawn or the scene changed the robots.
         TypeError: As `Swarm` does: for what is no mission, or cannot be called.
+        RuntimeError: If dm_control does not work with this MuJoCo; the message says what does.
 
     Example:
         >>> time_step = make_environment(paper("flocking"), seed=1).reset()
@@ -69,7 +71,14 @@ class SwarmPhysics(mujoco.Physics):
 
     def __init__(self, swarm: Swarm, seed: int) -> None:
         model = compose(swarm.mission, scene=swarm.scene).compile()
-        super().__init__(wrapper.MjData(wrapper.MjModel(model)))
+        try:
+            super().__init__(wrapper.MjData(wrapper.MjModel(model)))
+        except AttributeError as error:  # dm_control knows by name what a model has
+            raise RuntimeError(
+                f"dm_control {metadata.version('dm-control')} does not work with MuJoCo "
+                f"{metadata.version('mujoco')} ({error}); pip install 'swarm_mj[dm-control]' "
+                "chooses one that it works with"
+            ) from error
         self.swarm = swarm
         self.restart(seed)
 

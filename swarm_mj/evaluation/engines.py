@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from itertools import islice
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -286,12 +286,26 @@ def _inherited() -> Iterator[None]:
     """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
     before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
+    try:
+        with _masked():
+            yield
+    finally:
+        for name in SURROUNDINGS.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
+
+
+@contextmanager
+def _masked() -> Iterator[None]:
+    """Let processes that are started meanwhile inherit a mask against Ctrl-C, if there are any."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows, which has no resource tracker either
+        yield
+        return
+    from multiprocessing import resource_tracker
+
     resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for name in SURROUNDINGS.keys() - before.keys():
-            del os.environ[name]
-        os.environ.update(before)

@@ -22,12 +22,17 @@ Kind = TypeVar("Kind")
 Row = tuple[int, dict[str, str]]
 
 MAX_LETTERS = 160  # of what msgspec says
+# To open a pipe must not wait for who writes it. Windows has no such flags, but one that keeps it
+# from changing line ends.
+OPENED = os.O_RDONLY
+for flag in ("O_CLOEXEC", "O_NONBLOCK", "O_BINARY"):
+    OPENED |= getattr(os, flag, 0)
 
 
 def open_file(path: Path, what: str) -> BinaryIO:
     """Open a regular file, or raise ValueError at once: a pipe might have no end."""
     try:
-        number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        number = os.open(path, OPENED)
     except FileNotFoundError:
         raise ValueError(f"{what} {path} cannot be found") from None
     except OSError as error:
