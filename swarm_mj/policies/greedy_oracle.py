@@ -19,7 +19,7 @@ from swarm_mj.policies.about import Bound, Information, Listed, Look, PairMemory
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, merge_expected, observe_own, rise
 from swarm_mj.protocol.window import LocalViews
-from swarm_mj.radio.links import Links, air_of, listen
+from swarm_mj.radio.links import Links, air_of, among, listen
 from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.radio.reception import NOBODY
 from swarm_mj.system.compiled import compiled
@@ -38,7 +38,7 @@ class GreedyOracle(CentralisedPolicy):
         rank=130,
         uses=(
             "T in all buffers, all true positions and the true channel except its fades, at every "
-            "moment"
+            "moment, and which robots have failed"
         ),
         beyond=(Information.TRUE_POSITIONS, Information.ALL_BUFFERS, Information.TRUE_CHANNEL),
         payload=None,
@@ -64,6 +64,8 @@ class GreedyOracle(CentralisedPolicy):
         recipient = []
         for b, position_m in enumerate(states.position_m):
             links = self._truth.links(position_m, b)
+            if states.is_active is not None:
+                links = among(links, states.is_active[b])
             recipient.append(greedy_window(timestamp[b], now[b], links))
         return np.stack(recipient)
 

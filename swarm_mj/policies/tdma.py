@@ -25,6 +25,9 @@ from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
 
 CONTENTION_RANGES = 1.4  # robots nearer than this contend; tuned for 80 to 1000 walkers
+# In sparser areas no random team is connected. Robots that are all the same stand closer together
+# than the area says, and would contend as if alone, in every slot, for ever.
+MIN_EXPECTED = 3.0  # robots in reach, oneself too, below which robots take turns
 MIN_CROWDS = 8.0  # of robots in reach, below which teams do better by turns
 
 
@@ -119,7 +122,7 @@ class SpatialTdma(Tdma):
         # could send at once, and turns take too long.
         share = math.pi * (CONTENTION_RANGES * self._range_m) ** 2 / mission.side_m**2
         self._num_expected = mission.num_robots * share  # robots in reach, oneself too
-        self._contends = share <= 1.0 / MIN_CROWDS
+        self._contends = share <= 1.0 / MIN_CROWDS and self._num_expected >= MIN_EXPECTED
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""

@@ -62,6 +62,15 @@ class Links(NamedTuple):
         return len(self.curves) > 0
 
 
+def among(links: Links, takes_part: Bool[np.ndarray, "N"]) -> Links:
+    """Return the links without those of robots that neither send nor hear, such as failed ones."""
+    both = takes_part[:, np.newaxis] & takes_part
+    return links._replace(
+        received_mw=np.where(both, links.received_mw, 0.0),
+        interference_mw=np.where(both, links.interference_mw, 0.0),
+    )
+
+
 def links_between(
     radio: FreeSpaceRadio,
     position_m: Float[np.ndarray, "N 2"],

@@ -63,6 +63,21 @@ def test_the_oracle_addresses_nobody_behind_a_wall_of_the_true_channel():
     assert decided(policy, team) == [0, 1]
 
 
+def test_the_oracle_wastes_no_packet_on_a_robot_that_has_failed():
+    """Robot 2 is the oldest to both others, but off; robots 0 and 1 exchange."""
+    buffers = empty_buffers(1, 3)
+    buffers.timestamp[0] = [[9.0, 8.0, 0.0], [8.0, 9.0, 0.0], [0.0, 0.0, 5.0]]
+    views = LocalViews(buffers=buffers, now=np.array([9.0]), phases=())
+    position_m = np.array([[[0.0, 0.0], [100.0, 0.0], [50.0, 50.0]]])
+    is_active = np.array([[True, True, False]])
+    states = RobotStates(
+        position_m=position_m, velocity_mps=np.zeros_like(position_m), is_active=is_active
+    )
+    policy = make_policy("greedy-oracle", paper("stationary", num_robots=3))
+    (recipient,) = policy.recipients(views, states).tolist()
+    assert recipient in ([1, 1, 2], [0, 0, 2])
+
+
 def in_halves(team):
     """T and t in the scheduler's unit."""
     return (2 * team.timestamp).astype(np.float32), 2.0 * team.now

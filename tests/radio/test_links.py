@@ -14,6 +14,7 @@ from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.links import (
     STD_STEP_DB,
     air_of,
+    among,
     decode_curves,
     doubtful,
     links_between,
@@ -27,6 +28,17 @@ from swarm_mj.radio.reception import MIN_DISTANCE_M, NOBODY, incoming_at
 
 seeds = st.integers(0, 2**32 - 1)
 RADIO = radio_of(paper("stationary"))  # decodes up to 250 m in silence
+
+
+def test_links_of_robots_that_are_off_carry_nothing():
+    position_m = np.array([[0.0, 0.0], [100.0, 0.0], [50.0, 50.0]])
+    links = links_between(RADIO, position_m)
+    left = among(links, np.array([True, True, False]))
+    assert left.received_mw[0, 1] == links.received_mw[0, 1] > 0.0
+    assert left.interference_mw[0, 1] == links.interference_mw[0, 1]
+    for powers in (left.received_mw, left.interference_mw):
+        assert np.count_nonzero(powers[2]) == np.count_nonzero(powers[:, 2]) == 0
+    assert np.all(links.received_mw[2, :2] > 0.0)  # the links themselves stay
 
 
 @given(seed=seeds)
