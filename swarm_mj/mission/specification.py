@@ -36,6 +36,7 @@ MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity r
 SQUARE_METRES_PER_KM2 = 1e6
 MIN_SURVIVORS = 2  # whatever the fraction that fails, so that there is an age of information
 OPEN = "open"  # the arena of the paper's missions: nothing stands in it
+SENSED_ABOVE_NOISE_DB = 3.0  # of a preamble that its gain has lifted, or noise hides it
 CHANNEL = "channel"  # a heading of the help
 NOTHING = "nothing"  # is known beforehand, beyond free space
 NEW = "not the paper's"  # the source of what the paper has not
@@ -189,6 +190,56 @@ class Mission:
         low=-200.0,
         high=50.0,
         source=NEW,
+        group=CHANNEL,
+    )
+    sensing_gain_db: float = setting(
+        10.0,  # an 11-chip Barker code, as of IEEE 802.11, has 10.4
+        "how far a known preamble is lifted out of the noise where robots sense",
+        label="sensing gain",
+        unit="dB",
+        low=0.0,
+        high=40.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+    sensing_miss: float = setting(
+        0.0,
+        "probability that a robot senses nothing in a slot",
+        label="missed detection",
+        unit="per slot",
+        low=0.0,
+        high=1.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+    sensing_false_alarm: float = setting(
+        0.0,
+        "probability that it senses a busy channel in any case",
+        label="false alarm",
+        unit="per slot",
+        low=0.0,
+        high=1.0,
+        source=NEW,
+        group=CHANNEL,
+    )
+    minislots: int = setting(
+        64,
+        "moments of a slot in which robots that sense may begin",
+        label="number of minislots",
+        unit="per slot",
+        low=1,
+        high=1024,
+        source=NEW,
+        group=CHANNEL,
+    )
+    minislot_us: float = setting(
+        20.0,
+        "length of one; packets of policies that sense have the rest of the slot",
+        label="minislot",
+        unit="µs",
+        low=0.0,
+        high=500.0,
+        source="IEEE 802.11, direct sequence",
         group=CHANNEL,
     )
     frequency_hz: float = setting(
@@ -523,6 +574,23 @@ class Mission:
                 "exact physics knows no collisions; choose physics contact, or arena open (it is "
                 f"{self.arena}) whose robots pass through each other"
             )
+        self._check_sensing()
+
+    def _check_sensing(self) -> None:
+        """Raise ValueError for what no receiver senses, or minislots that leave no slot."""
+        floor_dbm = self.sensing_floor_dbm
+        if self.sensing_dbm is not None and self.sensing_dbm < floor_dbm:
+            raise ValueError(
+                f"sensing threshold must be at least {floor_dbm:g} dBm, below which the noise of "
+                f"{self.noise_dbm:g} dBm hides a preamble of {self.sensing_gain_db:g} dB gain, not "
+                f"{self.sensing_dbm:g}; choose that or more, or a larger sensing gain"
+            )
+        if self.contention_s >= self.slot_s:
+            raise ValueError(
+                f"{self.minislots} minislots of {self.minislot_us:g} µs take "
+                f"{1e3 * self.contention_s:g} ms, but a slot has {1e3 * self.slot_s:g} ms; choose "
+                "fewer or shorter ones"
+            )
 
     @property
     def side_m(self) -> float:
@@ -543,6 +611,16 @@ class Mission:
     def slot_s(self) -> float:
         """Length of a slot; a window has two (III-B) [s]."""
         return self.window_s / 2.0
+
+    @property
+    def sensing_floor_dbm(self) -> float:
+        """Least power that robots can sense [dBm]."""
+        return self.noise_dbm + SENSED_ABOVE_NOISE_DB - self.sensing_gain_db
+
+    @property
+    def contention_s(self) -> float:
+        """Length of the minislots at the start of a slot, where robots sense [s]."""
+        return self.minislots * self.minislot_us / 1e6
 
     @property
     def clocks_differ(self) -> bool:
@@ -612,6 +690,11 @@ class MissionFields(TypedDict, total=False):
     sinr_threshold_db: float
     noise_dbm: float
     sensing_dbm: float | None
+    sensing_gain_db: float
+    sensing_miss: float
+    sensing_false_alarm: float
+    minislots: int
+    minislot_us: float
     frequency_hz: float
     position_noise_m: float
     position_noise_s: float
