@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from swarm_mj.evaluation.published import BASELINES, points
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.policies.tuning import TABLE, read_table
 
 RESULTS = Path(__file__).parent.parent / "training" / "results"

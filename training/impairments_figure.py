@@ -21,7 +21,8 @@ from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import code, look_of, save, styled, write_caption
-from swarm_mj.evaluation.results import Result, config_of, read_results
+from swarm_mj.evaluation.results import Result, config_of
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.system.fields import setting
 
 ROOT = Path(__file__).resolve().parent.parent

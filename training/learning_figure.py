@@ -17,7 +17,8 @@ from swarm_mj.api.charts import LearningCurve, draw_learning
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.style import save
-from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.learning.run_folder import read_curve
 from swarm_mj.system.fields import setting
 from swarm_mj.system.writing import Output, check_outputs

@@ -19,7 +19,8 @@ from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
 from swarm_mj.evaluation.figures.style import BETTER, save
 from swarm_mj.evaluation.published import TEAM_SIZE
-from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.system.fields import setting
 from swarm_mj.system.writing import Output, check_outputs
 

@@ -25,7 +25,8 @@ from experiments import MOST_BYTES, Experiment, Scale, Settings, read_experiment
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import parse, script
-from swarm_mj.evaluation.results import Result, read_results, write_results
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results_files import read_results, write_results
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_run
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.stored import POLICY, read_policy

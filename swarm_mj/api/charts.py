@@ -15,13 +15,7 @@ from matplotlib.ticker import LogLocator
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures import style
 from swarm_mj.evaluation.figures.style import look_of
-from swarm_mj.evaluation.results import (
-    CARRIES_MORE,
-    Result,
-    carries_more,
-    is_flock,
-    statistics_of,
-)
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, is_flock, statistics_of
 from swarm_mj.evaluation.table import missions_of
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 

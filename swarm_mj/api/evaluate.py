@@ -5,8 +5,8 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
+from swarm_mj.api.flight_summary import Metrics
 from swarm_mj.api.fly import mission_of
-from swarm_mj.api.run import Metrics
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.flying import fly_study
@@ -32,8 +32,10 @@ if TYPE_CHECKING:  # each is slow to import
 FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem")
 LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
 # Of each age that is counted and of each mission, in memory and in a file [bytes].
-AGE_COUNT, AGE_COUNT_IN_FILE = 50.0, 5.0
-RESULT, RESULT_IN_FILE = 1000.0, 300.0
+AGE_COUNT = 50.0
+AGE_COUNT_IN_FILE = 5.0
+RESULT = 1000.0
+RESULT_IN_FILE = 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

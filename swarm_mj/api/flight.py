@@ -6,7 +6,6 @@ while there is enough to write the windows flown.
 
 import gc
 import time
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
 from typing import Any, NamedTuple
@@ -21,6 +20,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observer
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.memory import FLYING, LIBRARIES, policy_memory
@@ -45,9 +45,7 @@ class Flight:
     mission: Mission
     policy: Policy
     policy_name: str  # of which the registry made the policy; of a user's own object, its class's
-    probability: float | None = None  # that was asked for, as of `make_policy`
-    is_deterministic: bool = False  # likewise
-    features: Sequence[str] = ()  # likewise
+    arguments: PolicyArguments = USUAL  # with which it was made
     components: Components = Components()
     seed: int
     observer: int = 0  # the robot whose knowledge the replay shows
@@ -98,18 +96,12 @@ def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flow
     """
     mission = flight.mission
     check_observer(flight.observer, mission.num_robots)
-    registry.check_used(flight.features, [flight.policy])
+    registry.check_used(flight.arguments.features, [flight.policy])
     with console.status("Preparing the swarm ...") as status, compiling(status.update):
         swarm = Swarm(mission, [flight.seed], **flight.components.given)
         swarm.start(flight.policy)
         recorder = Recorder(swarm, ego=flight.observer) if flight.is_recorded else None
-        compile_ahead(
-            mission,
-            flight.policy_name,
-            probability=flight.probability,
-            is_deterministic=flight.is_deterministic,
-            features=flight.features,
-        )
+        compile_ahead(mission, flight.policy_name, flight.arguments)
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
     start_s = time.perf_counter()
     windows, code, ending = _fly_windows(swarm, recorder, bar, way_on)
@@ -194,27 +186,14 @@ def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     return Needs(memory=memory + IN_MEMORY.of(mission, num), file=ON_DISK.of(mission, num))
 
 
-def compile_ahead(
-    mission: Mission,
-    policy_name: str,
-    *,
-    probability: float | None = None,
-    is_deterministic: bool = False,
-    features: Sequence[str] = (),
-) -> None:
+def compile_ahead(mission: Mission, policy_name: str, arguments: PolicyArguments = USUAL) -> None:
     """Fly a small mission of this kind, beyond half-way, so that compiling is not timed."""
     # A stored policy may be for teams of one size, and a file's arena does not shrink.
     is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
     robots = mission.num_robots if is_bound else 3
     smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
     if policy_name in registry.POLICIES or registry.is_stored(policy_name):
-        policy = registry.make_policy(
-            policy_name,
-            smallest,
-            probability,
-            is_deterministic=is_deterministic,
-            features=features,
-        )
+        policy = registry.make_policy_with(arguments, policy_name, smallest)
     else:
         # A user's own may be made for one mission only, or be an object, which flies only once.
         policy = registry.make_policy("tdma", smallest)

@@ -1,5 +1,6 @@
 """The summary of one flight: each number declared once, with its unit."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
@@ -65,7 +66,23 @@ class FlightSummary(dict[str, Any]):
             raise AttributeError(f"there is no {name!r} here{did_you_mean(name, self)}")
 
 
-def as_lines(numbers: dict[str, Any]) -> str:
+class Metrics(dict[str, Any]):
+    """A dictionary whose keys are attributes as well."""
+
+    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any value
+        if name not in self:
+            raise AttributeError(f"there is no {name!r} here{did_you_mean(name, self)}")
+        return self[name]
+
+    def __dir__(self) -> list[str]:
+        return [*super().__dir__(), *self]
+
+    def __repr__(self) -> str:
+        """Return a line for each name; metrics within metrics are indented."""
+        return as_lines(self)
+
+
+def as_lines(numbers: Mapping[str, object]) -> str:
     """Return a line for each name; what takes several lines itself is indented below its name."""
     width = max(map(len, numbers), default=0)
     lines: list[str] = []

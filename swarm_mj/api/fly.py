@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Unpack
 
 from swarm_mj.api.flight import Flight, flight_needs, fly_mission
 from swarm_mj.api.run import Run
@@ -14,6 +14,7 @@ from swarm_mj.mission import Mission, PresetAndFields, make_mission
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
+from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check_kind, check_names, former_names
@@ -79,13 +80,12 @@ def fly(
     """
     mission = mission_of(fly, task, mission_fields)
     named = (features,) if isinstance(features, str) else tuple(features)
-    made, name = _policy_of(
-        policy,
-        mission,
+    arguments = PolicyArguments(
         probability=probability,
         is_deterministic=is_deterministic,
         features=named,
     )
+    made, name = _policy_of(policy, mission, arguments)
     way_out = "choose fewer num_robots or num_windows"
     if record:
         way_out += ", or record=False"
@@ -95,9 +95,7 @@ def fly(
         mission=mission,
         policy=made,
         policy_name=name,
-        probability=probability,
-        is_deterministic=is_deterministic,
-        features=named,
+        arguments=arguments,
         components=Components(channel=channel, controller=controller, scene=scene),
         seed=seed,
         observer=observer,
@@ -110,13 +108,13 @@ def fly(
 
 
 def mission_of(
-    function: Callable[..., Any], task: str | Mission | None, mission_fields: PresetAndFields
+    function: Callable[..., object], task: str | Mission | None, mission_fields: PresetAndFields
 ) -> Mission:
     """Return the mission that a function's arguments name; TypeError for fields it cannot have."""
     parameters = inspect.signature(function).parameters.values()
-    keywords = [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
-    names = [spec.name for spec in fields(Mission) if spec.name != "task"]
-    known = [*names, *keywords]
+    known = [spec.name for spec in fields(Mission)]
+    known.remove("task")  # which is given by position
+    known += [each.name for each in parameters if each.kind is each.KEYWORD_ONLY]
     check_names(f"swarm_mj.{function.__name__}", mission_fields, known, former_names(Mission))
     if isinstance(task, Mission) and mission_fields:
         given = ", ".join(f"{name}={value!r}" for name, value in mission_fields.items())
@@ -126,27 +124,15 @@ def mission_of(
 
 
 def _policy_of(
-    policy: str | Path | Policy,
-    mission: Mission,
-    *,
-    probability: float | None,
-    is_deterministic: bool,
-    features: Sequence[str],
+    policy: str | Path | Policy, mission: Mission, arguments: PolicyArguments
 ) -> tuple[Policy, str]:
     """Return a policy and its name: what was given, or its class's."""
     if isinstance(policy, Policy):
-        if probability is not None or is_deterministic:
+        if arguments.probability is not None or arguments.is_deterministic:
             raise TypeError(
                 "probability and is_deterministic change policies by name; make it with them"
             )
         return policy, type(policy).__name__
     check_kind("policy", policy, (str, Path), '"planner"')
     name = registry.flown_name(str(policy), mission)
-    made = registry.make_policy(
-        name,
-        mission,
-        probability,
-        is_deterministic=is_deterministic,
-        features=features,
-    )
-    return made, name
+    return registry.make_policy_with(arguments, name, mission), name

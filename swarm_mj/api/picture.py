@@ -1,8 +1,5 @@
 """A still map of one window, for a slide: robots by age, their trails, and packets on the way."""
 
-import textwrap
-from typing import NamedTuple
-
 import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
@@ -13,25 +10,30 @@ from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 
 from swarm_mj.api.charts import kept
-from swarm_mj.evaluation.figures.style import CAPTION, escape_mathtext, styled
+from swarm_mj.api.picture_text import (
+    BOTTOM_IN,
+    HEIGHT_IN,
+    POINTS_PER_IN,
+    RAMP_ROOM_IN,
+    SMALL_PT,
+    TEXT_PT,
+    WIDTH_IN,
+    draw_legend,
+    draw_ramp,
+    rgb,
+    share,
+    write_text,
+)
+from swarm_mj.evaluation.figures.style import styled
 from swarm_mj.physics import arenas, outlines, scene, state
-from swarm_mj.radio.words import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
-from swarm_mj.system.packages import version
 
-# The picture: 1920 by 1080 pixels.
-WIDTH_IN = 12.8
-HEIGHT_IN = 7.2
-DPI = 150
+DPI = 150  # so that the picture has 1920 by 1080 pixels
 # The map's side, and where it stands.
 MAP_IN = 6.3
 LEFT_IN = 0.85
-BOTTOM_IN = 0.6
 MARGIN = 1.04  # of the map, around what it must show
-TEXT_IN = 7.75  # where what is written begins
-RAMP_IN = 4.4  # how long the ramp of ages is
-RAMP_ROOM_IN = 0.75  # from the text's last line to the ramp's lower edge, its title between
 # Trails, which fade towards their beginnings.
 TRAIL_WINDOWS = 300
 PIECES = 15  # in which they fade
@@ -41,13 +43,6 @@ BRIGHTEST = 0.75  # and of the last
 SMALLEST_PT = 6.5
 LARGEST_PT = 13.0
 CROWD_PT = 75.0
-# Sizes of type.
-LARGE_PT = 22.0
-TEXT_PT = 13.0
-SMALL_PT = 10.5
-LINE = 1.45  # of a line's height, by the size of its type
-CHARACTERS = 52  # of a line
-POINTS_PER_IN = 72.0
 
 
 def draw_picture(footage: Footage, window: int | None = None) -> Figure:
@@ -66,8 +61,8 @@ def draw_picture(footage: Footage, window: int | None = None) -> Figure:
     row = _row(footage, window)
     with styled():
         figure = plt.figure(figsize=(WIDTH_IN, HEIGHT_IN), dpi=DPI)
-        figure.set_facecolor(_rgb(palette.BACKGROUND))
-        axes = figure.add_axes(_share(LEFT_IN, BOTTOM_IN, MAP_IN, MAP_IN))
+        figure.set_facecolor(rgb(palette.BACKGROUND))
+        axes = figure.add_axes(share(LEFT_IN, BOTTOM_IN, MAP_IN, MAP_IN))
         radius_m = _frame(axes, footage, row)
         shown = _draw_ground(axes, footage)
         longest_m = np.ptp(_trails(footage, row), axis=0).max()
@@ -75,9 +70,9 @@ def draw_picture(footage: Footage, window: int | None = None) -> Figure:
             shown.append(_draw_trails(axes, footage, row))
         shown += _draw_robots(axes, footage, row)
         shown += _draw_packets(axes, footage, row, radius_m)
-        below_in = _write(figure, footage, row)
-        _draw_ramp(figure, footage, below_in)
-        _draw_legend(figure, shown, below_in - RAMP_ROOM_IN)
+        below_in = write_text(figure, footage, row)
+        draw_ramp(figure, footage, below_in)
+        draw_legend(figure, shown, below_in - RAMP_ROOM_IN)
     return kept(figure)
 
 
@@ -87,23 +82,6 @@ def _row(footage: Footage, window: int | None) -> int:
     if window is not None and window not in windows:
         raise ValueError(f"window must be from {windows[0]} to {windows[-1]}, not {window}")
     return len(windows) - 1 if window is None else windows.index(window)
-
-
-def _share(
-    left_in: float, bottom_in: float, width_in: float, height_in: float
-) -> tuple[float, float, float, float]:
-    """Return a place on the picture as matplotlib takes it: by the picture's width and height."""
-    return (
-        left_in / WIDTH_IN,
-        bottom_in / HEIGHT_IN,
-        width_in / WIDTH_IN,
-        height_in / HEIGHT_IN,
-    )
-
-
-def _rgb(colour: palette.Colour) -> str:
-    """Return a colour as matplotlib takes it, such as #ff8000."""
-    return f"#{bytes(colour).hex()}"
 
 
 def _size_pt(footage: Footage) -> float:
@@ -125,14 +103,14 @@ def _frame(axes: Axes, footage: Footage, row: int) -> float:
     x, y = ground.centre_m[0]
     reach_m = MARGIN * ground.reach_m
     axes.set(xlim=(x - reach_m, x + reach_m), ylim=(y - reach_m, y + reach_m), aspect="equal")
-    axes.set_facecolor(_rgb(palette.BACKGROUND))
-    axes.grid(color=_rgb(palette.GRID), linewidth=0.8)
-    faint = _rgb(palette.WALL)
-    grey = _rgb(palette.SENT)
+    axes.set_facecolor(rgb(palette.BACKGROUND))
+    axes.grid(color=rgb(palette.GRID), linewidth=0.8)
+    faint = rgb(palette.WALL)
+    grey = rgb(palette.SENT)
     axes.set_xlabel("x [m]", fontsize=TEXT_PT, color=grey)
     axes.set_ylabel("y [m]", fontsize=TEXT_PT, color=grey)
     axes.tick_params(colors=faint, labelcolor=grey, labelsize=SMALL_PT)
-    axes.spines[:].set(visible=True, color=_rgb(palette.OUTLINE))
+    axes.spines[:].set(visible=True, color=rgb(palette.OUTLINE))
     return reach_m * _size_pt(footage) / (POINTS_PER_IN * MAP_IN)
 
 
@@ -141,7 +119,7 @@ def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     mission = footage.facts.mission
     low_m = -mission.half_side_m
     side_m = mission.side_m
-    colour = _rgb(palette.WALL)
+    colour = rgb(palette.WALL)
     dashes = "-" if mission.has_walls else "--"
     border = Rectangle((low_m, low_m), side_m, side_m, fill=False, zorder=1.0)
     border.set(linestyle=dashes, linewidth=1.2, edgecolor=colour)
@@ -152,7 +130,7 @@ def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     if len(obstacles.kind) > 0:
         for outline_m in outlines.footprints(obstacles, state.ROBOT_HEIGHT_M):
             block = Polygon(outline_m, linewidth=0.8, zorder=1.5)
-            block.set(facecolor=_rgb(palette.OUTLINE), edgecolor=colour)
+            block.set(facecolor=rgb(palette.OUTLINE), edgecolor=colour)
             axes.add_patch(block)
         shown.append(_dot("obstacle", palette.OUTLINE, "s", palette.WALL))
     return shown
@@ -171,7 +149,7 @@ def _draw_trails(axes: Axes, footage: Footage, row: int) -> Line2D:
         lines.set_alpha(alpha)
         axes.add_collection(lines, autolim=False)
     label = f"trail of the last {(len(trails_m) - 1) * footage.facts.mission.window_s:g} s"
-    return Line2D([], [], color=_rgb(palette.SENT), alpha=BRIGHTEST, linewidth=1.6, label=label)
+    return Line2D([], [], color=rgb(palette.SENT), alpha=BRIGHTEST, linewidth=1.6, label=label)
 
 
 def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
@@ -180,9 +158,9 @@ def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
     size = _size_pt(footage) ** 2  # matplotlib scatters by area
     off = footage.is_cut_off[row]
     if np.any(off):
-        axes.scatter(x[off], y[off], s=3.2 * size, color=_rgb(palette.CUT_OFF), zorder=3.0)
+        axes.scatter(x[off], y[off], s=3.2 * size, color=rgb(palette.CUT_OFF), zorder=3.0)
     colours = footage.colours[row] / 255.0
-    edge = _rgb(palette.BACKGROUND)
+    edge = rgb(palette.BACKGROUND)
     axes.scatter(x, y, s=size, c=colours, edgecolors=edge, linewidths=0.8, zorder=4.0)
     own = footage.ego  # the robot whose knowledge the colours show
     beside_pt = 0.7 * _size_pt(footage)
@@ -191,7 +169,7 @@ def _draw_robots(axes: Axes, footage: Footage, row: int) -> list[Line2D]:
         xy=(x[own], y[own]),
         xytext=(beside_pt, beside_pt),
         textcoords="offset points",
-        color=_rgb(palette.EGO),
+        color=rgb(palette.EGO),
         fontsize=TEXT_PT,
         fontweight="bold",
         zorder=6.0,
@@ -219,7 +197,7 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
         rim_m = radius_m * way_m[far] / span_m[far]
         start_m = packets.start_m[far] + rim_m
         along_m = way_m[far] - 2.0 * rim_m
-        colour = _rgb(palette.PACKETS[fate].colour)
+        colour = rgb(palette.PACKETS[fate].colour)
         axes.quiver(
             start_m[:, 0],
             start_m[:, 1],
@@ -244,77 +222,5 @@ def _dot(
 ) -> Line2D:
     """Return a marker for the legend."""
     dot = Line2D([], [], linestyle="", marker=marker, markersize=9.0, label=label)
-    dot.set(markerfacecolor=_rgb(colour), markeredgecolor=_rgb(edge or colour))
+    dot.set(markerfacecolor=rgb(colour), markeredgecolor=rgb(edge or colour))
     return dot
-
-
-class _Line(NamedTuple):
-    """A line of text beside the map."""
-
-    text: str
-    size_pt: float
-    colour: palette.Colour
-
-
-def _lines(footage: Footage, row: int) -> list[_Line]:
-    """Return title, mission and time."""
-    facts = footage.facts
-    mission = facts.mission
-    lines = [_Line(facts.policy or "a mission", LARGE_PT, palette.TEXT)]
-    about = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
-    lines += [_Line(each, TEXT_PT, palette.TEXT) for each in textwrap.wrap(about, CHARACTERS)]
-    where = ", ".join([*where_flown(mission), *facts.own_parts])
-    wrapped = textwrap.wrap(where, CHARACTERS, break_on_hyphens=False)
-    lines += [_Line(each, SMALL_PT, palette.SENT) for each in wrapped]
-    now = footage.window[row]
-    time = f"{now * mission.window_s:.1f} s, window {now} of {mission.num_windows}"
-    lines.append(_Line(time, TEXT_PT, palette.TEXT))
-    if np.isfinite(footage.age_mean[row]):
-        age = f"mean age of information: {footage.age_mean[row]:.1f} windows"
-        lines.append(_Line(age, TEXT_PT, palette.MEAN_AGE))
-    return lines
-
-
-def _write(figure: Figure, footage: Footage, row: int) -> float:
-    """Write title and time beside the map; return how high the last line stands [in]."""
-    x = TEXT_IN / WIDTH_IN
-    y_in = HEIGHT_IN - 0.3
-    for line in _lines(footage, row):
-        y_in -= LINE * line.size_pt / POINTS_PER_IN
-        text = escape_mathtext(line.text)
-        colour = _rgb(line.colour)
-        figure.text(x, y_in / HEIGHT_IN, text, fontsize=line.size_pt, color=colour)
-    made_by = f"swarm_mj {version()}"
-    colour = _rgb(palette.WALL)
-    figure.text(x, BOTTOM_IN / HEIGHT_IN, made_by, fontsize=8.0, color=colour, gid=CAPTION)
-    return y_in
-
-
-def _draw_ramp(figure: Figure, footage: Footage, below_in: float) -> None:
-    """Draw what colour stands for what age, below a height on the picture [in]."""
-    full = footage.facts.full_scale
-    axes = figure.add_axes(_share(TEXT_IN, below_in - RAMP_ROOM_IN, RAMP_IN, 0.2))
-    ages = np.linspace(0.0, full, 256)
-    axes.imshow(palette.age_colours(ages, full)[None], aspect="auto", extent=(0.0, full, 0.0, 1.0))
-    title = f"age of what r{footage.ego} knows of a robot [windows]"
-    axes.set_title(title, fontsize=TEXT_PT, color=_rgb(palette.TEXT))
-    axes.set_xticks([0.0, full / 2.0, full], ["0", f"{full / 2.0:g}", f"{full:g} or more"])
-    axes.tick_params(colors=_rgb(palette.WALL), labelcolor=_rgb(palette.SENT), labelsize=SMALL_PT)
-    axes.set_yticks([])
-    axes.grid(visible=False)
-    axes.spines[:].set_visible(False)
-
-
-def _draw_legend(figure: Figure, shown: list[Line2D], below_in: float) -> None:
-    """Name what is drawn, by its samples, below a height on the picture [in]."""
-    figure.legend(
-        handles=shown,
-        loc="upper left",
-        bbox_to_anchor=((TEXT_IN - 0.05) / WIDTH_IN, (below_in - 0.4) / HEIGHT_IN),
-        frameon=False,
-        fontsize=TEXT_PT,
-        labelcolor=_rgb(palette.SENT),
-        borderpad=0.0,
-        borderaxespad=0.0,
-        labelspacing=0.6,
-    )

@@ -4,25 +4,24 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from html import escape
-from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from jaxtyping import Float, Shaped
+from jaxtyping import Float
 from rich.table import Table
 
-from swarm_mj.api.flight_summary import FlightSummary, as_lines
+from swarm_mj.api.flight_columns import flight_columns
+from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.costs import PACKET_COUNTS
-from swarm_mj.protocol.mission_costs import AOI, MISSION_COSTS
+from swarm_mj.protocol.mission_costs import AOI
 from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.system import terminal
-from swarm_mj.system.fields import as_typed, did_you_mean
+from swarm_mj.system.fields import as_typed
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import is_notebook
 from swarm_mj.system.writing import Output, check_outputs, write_bytes, write_csv, write_json
@@ -36,22 +35,6 @@ ELSEWHERE = (
     "run.show() plays a video in a notebook. Here, run.save('flight.mp4') writes the video, and "
     "run.save('flight.rrd') a replay that `swarm-mj replay flight.rrd` opens."
 )
-
-
-class Metrics(dict[str, Any]):
-    """A dictionary whose keys are attributes as well."""
-
-    def __getattr__(self, name: str) -> Any:  # noqa: ANN401 - any value
-        if name not in self:
-            raise AttributeError(f"there is no {name!r} here{did_you_mean(name, self)}")
-        return self[name]
-
-    def __dir__(self) -> list[str]:
-        return [*super().__dir__(), *self]
-
-    def __repr__(self) -> str:
-        """Return a line for each name; metrics within metrics are indented."""
-        return as_lines(self)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -129,25 +112,7 @@ class Run:
         Returns:
             The columns of `to_dataframe`, in its order, each with a number for each window.
         """
-        window = np.arange(1.0, len(self.windows) + 1.0)
-        columns = {"window": window, "seconds": np.round(window * self.mission.window_s, 9)}
-        for cost in MISSION_COSTS:
-            by_window: list[np.ndarray] = []
-            for each in self.windows:
-                values = cost.of_window(each.costs)
-                if values is not None:
-                    by_window.append(values)
-            if by_window:  # or else the task has no such cost
-                columns[cost.column] = _course(by_window)
-            if cost is AOI and self.log is not None:  # the mean, and beside it the worst
-                columns["aoi_worst"] = self.log.age_max
-        columns["hops"] = _course([each.hops for each in self.windows])
-        columns["is_complete"] = _course([each.costs.is_complete for each in self.windows])
-        packets = [each.costs.packets for each in self.windows]
-        for name in PACKET_COUNTS:
-            count_of = attrgetter(name)
-            columns[f"packets_{name}"] = _course([count_of(each) for each in packets])
-        return columns
+        return flight_columns(self.mission, self.windows, self.log)
 
     def to_dataframe(self) -> "DataFrame":
         """Return one row per window, at its end.
@@ -328,8 +293,3 @@ class Run:
         console = terminal.quiet_console()
         with terminal.WorkBar("Drawing", style.num_frames, "pictures", console=console) as bar:
             return make_video([footage], ending, style, bar.advance)
-
-
-def _course(by_window: Sequence[Shaped[np.ndarray, "B"]]) -> Float[np.ndarray, "T"]:
-    """Return a number of the one mission over its windows, also a truth as 0 or 1."""
-    return np.concatenate(by_window).astype(float)

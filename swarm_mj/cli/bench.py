@@ -79,7 +79,8 @@ def run(options: BenchOptions) -> int:
         _check_teams(set(options.robots))
     tell_cores(options.jobs if options.episodes else 1)
     tell_cores(options.threads, "threads")
-    tables, steps_us = [], [sim.plain_step_us(options.seconds / 4)]
+    tables = []
+    steps_us = [sim.plain_step_us(options.seconds / 4)]
     with Console(stderr=True).status("Measuring ...") as status:
         tables_of = _team_tables if options.robots or options.plot else _tables
         for table in tables_of(options, status.update):
@@ -95,7 +96,8 @@ def run(options: BenchOptions) -> int:
 
 def noise(steps_us: Sequence[float]) -> str:
     """Return the spread of a measurement that should always be the same."""
-    least, most = min(steps_us), max(steps_us)
+    least = min(steps_us)
+    most = max(steps_us)
     spread = most / least - 1.0
     busy = "; the machine was busy, so measure again when it is not" if spread > BUSY else ""
     measured = f"measured {len(steps_us)} times, from {least:.2f} to {most:.2f} µs"
@@ -115,14 +117,12 @@ def document(
 
 
 def _entry(measured: Measured) -> dict[str, Any]:
-    rows = [
-        {
-            "name": first.name.strip(),
-            "values": [first.value, *(row.value for row in others)],
-            "unit": first.form.partition("}")[2].strip() or None,
-        }
-        for first, *others in zip(*measured.columns.values(), strict=True)
-    ]
+    rows: list[dict[str, Any]] = []
+    for across in zip(*measured.columns.values(), strict=True):  # a row in all columns
+        first = across[0]
+        _, _, unit = first.form.partition("}")
+        values = [row.value for row in across]
+        rows.append({"name": first.name.strip(), "values": values, "unit": unit.strip() or None})
     return {"title": measured.title, "columns": list(measured.columns), "rows": rows}
 
 
@@ -171,7 +171,9 @@ def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Measu
     yield Measured(title, {"": list(sim.world_rows(WORLD_MISSIONS, options.seconds))})
     say("Measuring how long policies take to decide ...")
     is_left_out = options.no_learning or not is_installed("torch")
-    policies = [name for name in POLICIES if not (name == SHIPPED and is_left_out)]
+    policies = list(POLICIES)
+    if is_left_out:
+        policies.remove(SHIPPED)
     columns = {
         name: list(bench_decisions.decision_rows(mission, policies, options.seconds / 2))
         for name, mission in bench_decisions.TEAMS.items()

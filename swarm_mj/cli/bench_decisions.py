@@ -39,7 +39,8 @@ def decision_rows(mission: Mission, policies: Collection[str], seconds: float) -
 def _decision_us(policy: str, mission: Mission, seconds: float) -> float:
     """Return the median over missions of the mean time of a window's decisions [µs]."""
     compile_ahead(mission, policy)
-    swarm, missions_us = TimedSwarm(mission, [0]), []
+    swarm = TimedSwarm(mission, [0])
+    missions_us = []
     end_s = time.perf_counter() + seconds
     while not missions_us or time.perf_counter() < end_s:
         swarm.restart([len(missions_us)])

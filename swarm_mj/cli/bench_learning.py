@@ -45,7 +45,8 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
 
 def _environment_windows(mission: Mission, num_missions: int, seconds: float) -> float:
     """Return a step of the environment over a window of its missions that a `Swarm` flies alone."""
-    swarm, env = Swarm(mission, range(num_missions)), SwarmVectorEnv(num_missions, mission)
+    swarm = Swarm(mission, range(num_missions))
+    env = SwarmVectorEnv(num_missions, mission)
     swarm.start(RoundRobin())
     env.reset(seed=list(range(num_missions)))
     window_us = microseconds(swarm.step, seconds / 2)
@@ -71,7 +72,8 @@ def _forward(network: torch.nn.Module, *inputs: torch.Tensor) -> Callable[[], ob
 def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float) -> float:
     """Return the team decisions per second of rollouts and the optimisation after each."""
     settings = usual_settings(credit, mission, (mission.num_robots,))
-    ppo, share = settings.ppo, settings.groups
+    ppo = settings.ppo
+    share = settings.groups
     # One group of missions, and minibatches of about the usual size, so that it ends in time.
     ppo = replace(ppo, num_minibatches=max(1, ppo.num_minibatches // share))
     missions = settings.missions // share
@@ -82,7 +84,8 @@ def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float)
 
 def _graphs(mission: Mission, features: str, number: int) -> tuple[torch.Tensor, torch.Tensor]:
     """Return the features and parents of all robots' nodes after a warm-up."""
-    swarm, policy = Swarm(mission, range(number)), RoundRobin()
+    swarm = Swarm(mission, range(number))
+    policy = RoundRobin()
     extractor = make_extractor(features, mission)
     extractor.start(number, mission.num_robots)
     for _ in range(WARM_UP_WINDOWS):

@@ -139,15 +139,20 @@ def _line(group: Sequence[Learned]) -> "LearningCurve":
     """Return the ages of runs where all of them have been evaluated."""
     from swarm_mj.api.charts import LearningCurve  # matplotlib is slow to import
 
-    ages_at = [{row["decisions"]: row["aoi"] for row in each.rows} for each in group]
+    ages_at: list[dict[float, float]] = []  # of each run, by the decisions behind them
+    for each in group:
+        own = {row["decisions"]: row["aoi"] for row in each.rows}
+        ages_at.append(own)
     shared = set(ages_at[0])
-    for each in ages_at:
-        shared &= set(each)
+    for own in ages_at:
+        shared &= set(own)
     decisions = sorted(shared)
-    ages = np.array([[each[at] for at in decisions] for each in ages_at])
+    age = np.empty((len(group), len(decisions)))
+    for r, own in enumerate(ages_at):
+        age[r] = [own[at] for at in decisions]
     return LearningCurve(
         decisions=np.array(decisions, dtype=float),
-        age=ages.mean(axis=0),
-        low=ages.min(axis=0),
-        high=ages.max(axis=0),
+        age=age.mean(axis=0),
+        low=age.min(axis=0),
+        high=age.max(axis=0),
     )

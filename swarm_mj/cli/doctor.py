@@ -94,7 +94,8 @@ def packages() -> Iterator[Finding]:
 
 
 def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
-    problems, found = [], "installed"
+    problems = []
+    found = "installed"
     for each in asked:
         try:
             found = metadata.version(each.name)
@@ -146,7 +147,8 @@ def machine() -> Iterator[Finding]:
 def _compiled_code() -> Finding:
     """Find where numba keeps what it compiled; without a place every start compiles."""
     compiled: Any = reception.sinr
-    folder, problem = compiled.stats.cache_path, "not kept: every start compiles anew"
+    folder = compiled.stats.cache_path
+    problem = "not kept: every start compiles anew"
     try:
         if folder is not None:
             check_writable(Path(folder) / "kernels")

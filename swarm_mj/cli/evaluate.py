@@ -1,13 +1,13 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
 import shlex
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import ClassVar
 
 from rich.console import Console
 
@@ -88,7 +88,9 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
             regimes=self.missions,
             episodes=self.episodes,
             seed=self.seed,
-            **self.how,
+            probability=self.probability,
+            is_deterministic=self.is_deterministic,
+            features=self.features,
             components=self.components,
             baseline=None if self.baseline is None else flown.get(self.baseline, self.baseline),
         )
@@ -159,7 +161,7 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     return DONE
 
 
-def _begun(kept: Path, header: dict[str, Any], *, is_resumed: bool) -> dict[int, BatchCosts]:
+def _begun(kept: Path, header: Mapping[str, object], *, is_resumed: bool) -> dict[int, BatchCosts]:
     """Return what the progress file has of the study; begin the file unless it is resumed."""
     if is_resumed and kept.exists():
         return flying.resume_progress(kept, header)

@@ -10,7 +10,8 @@ from rich.status import Status as StatusLine
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURES
-from swarm_mj.evaluation.results import Result, read_results
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.policies.registry import files_of
 from swarm_mj.system.fields import GONE_IN, check_choice, files_read, setting, the_file
 from swarm_mj.system.terminal import plain_console
@@ -106,7 +107,11 @@ def _draw(
         except NoPointsError:
             if options.figure != FIGURES:
                 raise
-    return {name: drawn[name] for name in options.figure if name in drawn}
+    in_order: dict[str, Figure] = {}
+    for name in options.figure:
+        if name in drawn:
+            in_order[name] = drawn[name]
+    return in_order
 
 
 def _paths(options: FiguresOptions) -> dict[str, list[Path]]:

@@ -104,9 +104,9 @@ def _flight(options: FlyOptions, *, is_recorded: bool) -> Flight:
     """Return what the options fly."""
     return Flight(
         mission=options.mission,
-        policy=registry.make_policy(options.policy, options.mission, **options.how),
+        policy=registry.make_policy_with(options.arguments, options.policy, options.mission),
         policy_name=options.policy,
-        **options.how,
+        arguments=options.arguments,
         components=options.components,
         seed=options.seed,
         observer=options.observer,

@@ -8,10 +8,11 @@ from functools import partial
 from itertools import product
 from typing import Any
 
-from swarm_mj.cli.options import Option, flags_of, nested
+from swarm_mj.cli.options import Given, Option, flags_of, nested
 from swarm_mj.evaluation.study import MAX_REGIMES
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.simulation.components import GROUP, SHOWN_AS, Components
 from swarm_mj.system.fields import Meaning, about_of, as_typed, kind_of, setting
@@ -64,14 +65,17 @@ class PolicyOptions(Components):
         return Components(**self.given)
 
     @property
-    def how(self) -> dict[str, Any]:
-        """Arguments of `make_policy` and `Study`, but for the policy's name and the mission."""
-        names = ("probability", "is_deterministic", "features")
-        return {name: getattr(self, name) for name in names}
+    def arguments(self) -> PolicyArguments:
+        """The arguments that change the policy."""
+        return PolicyArguments(
+            probability=self.probability,
+            is_deterministic=self.is_deterministic,
+            features=self.features,
+        )
 
 
 def missions_of(
-    given: dict[str, Any], called: Callable[[str], str] = FLAGS.__getitem__
+    given: Given, called: Callable[[str], str] = FLAGS.__getitem__
 ) -> tuple[Mission, ...]:
     """Return the missions of fields given, as `mission.NAME`; a tuple of values is swept."""
     swept: dict[str, list[Any]] = {}
@@ -107,7 +111,7 @@ def _check_number(swept: Mapping[str, Collection[Any]]) -> None:
         )
 
 
-def mission_of(given: dict[str, Any]) -> Mission:
+def mission_of(given: Given) -> Mission:
     """Return the one mission of fields given, as `mission.NAME`."""
     (mission,) = missions_of(given)
     return mission
@@ -122,7 +126,8 @@ def check_in_use(
         if switch is None or spec.name not in given:
             continue
         if not any(switch.is_on(mission) for mission in missions):
-            own, other = called(spec.name), called(switch.name)
+            own = called(spec.name)
+            other = called(switch.name)
             ways = f"give that too, or leave {own} out"
             raise ValueError(f"{own} counts only with {other} {switch.state or 'above 0'}; {ways}")
 

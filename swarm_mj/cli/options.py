@@ -15,18 +15,21 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn, TypeVar, get_origin
 
+from swarm_mj.cli.option_values import CONVERT
 from swarm_mj.system import fields as settings
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import Meaning, about_of
 
 Value = TypeVar("Value")
+# What was typed, by the places of the options. Each value is of its option's type, which the parser
+# has seen to and no type checker can know.
+Given = dict[str, Any]
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 output_option = partial(settings.setting, group="output")  # under this heading of the help
 common_output = partial(output_option, is_common=True)
 NESTED = "nested"  # the key of a field's metadata that several options fill
-BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
 
 class Parser(argparse.ArgumentParser):
@@ -38,11 +41,12 @@ class Parser(argparse.ArgumentParser):
         """Return the help; its last line says how to see the options that it leaves out."""
         if not self.rare:
             return super().format_help()
-        titles = [
-            str(group.title).partition(",")[0]
-            for group in self._action_groups
-            if group._group_actions and set(group._group_actions) <= self.rare.keys()
-        ]
+        titles: list[str] = []  # of groups that are left out whole
+        for group in self._action_groups:
+            actions = set(group._group_actions)
+            if actions and actions <= self.rare.keys():
+                title, _, _ = str(group.title).partition(",")
+                titles.append(title)
         left_out = f"{self.prog} --help-all shows {len(self.rare)} more"
         named = f": {', '.join(titles)}" if titles else ""
         return f"{super().format_help()}\n{left_out}{named}\n"
@@ -54,7 +58,9 @@ class Parser(argparse.ArgumentParser):
                 self.error(f"argument {argument.partition('=')[0]}: expected a value, not '--'")
         parsed, left = self.parse_known_args(arguments)
         if left:
-            flags = [flag for action in self._actions for flag in action.option_strings]
+            flags: list[str] = []
+            for action in self._actions:
+                flags.extend(action.option_strings)
             hint = settings.did_you_mean(left[0].partition("=")[0], flags)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
@@ -115,12 +121,10 @@ class Nested:
     """A field that several options fill."""
 
     options: Callable[[], Iterable[Option]]
-    build: Callable[[dict[str, Any]], Any]
+    build: Callable[[Given], Any]
 
 
-def nested(
-    options: Callable[[], Iterable[Option]], build: Callable[[dict[str, Any]], Value]
-) -> Value:
+def nested(options: Callable[[], Iterable[Option]], build: Callable[[Given], Value]) -> Value:
     """Return a field that several options fill; type checkers take it for what `build` makes.
 
     Args:
@@ -140,13 +144,16 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
     """
     _check_names(arguments)
     parsed = vars(_parser_of(kind, prog, summary).known(arguments))
-    given: dict[str, Any] = {"typed": tuple(arguments)}
+    given: Given = {"typed": tuple(arguments)}
     given |= {name: tuple(x) if isinstance(x, list) else x for name, x in parsed.items()}
     specs = fields(kind)
-    values = {spec.name: given[spec.name] for spec in specs if spec.name in given}
+    values: Given = {}
     for spec in specs:
-        if filled := _nested_in(spec):
+        filled = _nested_in(spec)
+        if filled is not None:
             values[spec.name] = filled.build(given)
+        elif spec.name in given:
+            values[spec.name] = given[spec.name]
     options = kind(**values)
     settings.check(options)
     return options
@@ -283,26 +290,3 @@ def _help(option: Option) -> str:
 
 def _metavar(option: Option) -> str:
     return option.about.metavar or METAVARS.get(settings.kind_of(option.spec), "VALUE")
-
-
-def _path(text: str) -> Path:
-    """Return a path; an empty name would be the current folder."""
-    if not text:
-        raise argparse.ArgumentTypeError("name a file or a folder, not ''")
-    return Path(text)
-
-
-def _bit_rate(text: str) -> float | None:
-    """Return a rate such as 250000, 250k or 6M, or `none`."""
-    if text.lower() == "none":
-        return None
-    unit = BIT_RATES.get(text[-1:].lower(), 1.0)
-    try:
-        return float(text if unit == 1.0 else text[:-1]) * unit
-    except ValueError:
-        example = "250k, 1M or none"
-        raise argparse.ArgumentTypeError(f"name bits per second, {example}, not {text!r}") from None
-
-
-# Functions that read a value, by its type or unit; other types read it themselves.
-CONVERT: dict[Any, Callable[[str], Any]] = {Path: _path, "bit/s": _bit_rate}

@@ -22,14 +22,16 @@ from swarm_mj.policies.registry import (
     is_own_policy,
     make_policy,
 )
-from swarm_mj.protocol.packets import times
+from swarm_mj.protocol.packets import PacketField, times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, common_setting, setting
 from swarm_mj.system.packages import is_installed, missing
 from swarm_mj.system.terminal import named_values, plain_console, this_command
 
 HEADINGS = {False: "each robot decides by itself", True: "a centre decides"}
-BROADCASTS, REQUEST = "broadcasts", "request"  # the forms of a window
+# The forms of a window.
+BROADCASTS = "broadcasts"
+REQUEST = "request"
 WINDOWS = {
     BROADCASTS: "two broadcasts, which nobody answers",
     REQUEST: "a request to a teammate, which answers",
@@ -54,14 +56,16 @@ class PoliciesOptions:
 
 def run(options: PoliciesOptions) -> int:
     """Run the command; return its exit code."""
-    mission, names = options.mission, [options.name]
-    if options.name is None:
+    mission = options.mission
+    if options.name is not None:
+        names = [options.name]
+    else:
         flown = dict.fromkeys(flown_name(name, mission) for name in POLICIES)
         names = [name for name in flown if name != SHIPPED or is_installed("torch")]
         if len(names) < len(flown):
             plain_console(is_error=True).print(missing("torch", f"{SHIPPED} is left out: it"))
     with Console(stderr=True).status("Loading ..."):
-        policies = {name: make_policy(name, mission) for name in names if name}
+        policies = {name: make_policy(name, mission) for name in names}
         facts = [facts_of(name, policy, mission) for name, policy in policies.items()]
     if options.json:
         sys.stdout.write(json.dumps(facts if options.name is None else facts[0], indent=2) + "\n")
@@ -74,7 +78,9 @@ def run(options: PoliciesOptions) -> int:
 
 def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
     """Return a policy's description of itself, as `--json` has it."""
-    kind, packet, about = type(policy), policy.packet(mission), policy.about
+    kind = type(policy)
+    packet = policy.packet(mission)
+    about = policy.about
     entries = [times(field, packet.num_entries) for field in packet.entry]
     return {
         "name": name,
@@ -85,15 +91,22 @@ def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
         "payload": policy.payload,
         "packet_bytes": packet.num_bytes,
         "packet_fields": [
-            {"name": field.name, "bits": field.bits, "count": field.count}
-            | ({"step": field.step, "unit": field.unit} if field.unit else {})
-            for field in (*packet.header, *entries, *packet.payload)
+            _field_facts(field) for field in (*packet.header, *entries, *packet.payload)
         ],
         "probability": policy.parameters.get("probability"),
         "parameters": dict(policy.parameters),
         "class": f"{kind.__module__}.{kind.__qualname__}",
         "description": inspect.getdoc(kind) or "",
     }
+
+
+def _field_facts(field: PacketField) -> dict[str, Any]:
+    """Return what `--json` has of a packet's field; of counts and choices, no step."""
+    facts: dict[str, Any] = {"name": field.name, "bits": field.bits, "count": field.count}
+    if field.unit:
+        facts["step"] = field.step
+        facts["unit"] = field.unit
+    return facts
 
 
 def _uses(name: str, policy: Policy, mission: Mission) -> str:
@@ -110,7 +123,9 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
         columns = [Column(head, no_wrap=True) for head in ("policy", heading)]
         table = Table(*columns, box=SIMPLE_HEAD, show_edge=False, pad_edge=False)
         table.add_column("packets", justify="right")
-        for each in (each for each in facts if each["is_centralised"] == is_centralised):
+        for each in facts:
+            if each["is_centralised"] != is_centralised:
+                continue
             does = each["description"].partition("\n")[0].removesuffix(".")
             table.add_row(each["name"], does, f"{each['packet_bytes']:,} B")
         console.print(table, "")
@@ -150,7 +165,8 @@ def _print_one(each: dict[str, Any], policy: Policy, mission: Mission) -> None:
 
 def _beyond_paper(each: dict[str, Any]) -> dict[str, str]:
     """Return the row of what a policy uses beyond the paper; a stored network's has none."""
-    row, beyond = "beyond the paper", each["beyond_paper"]
+    row = "beyond the paper"
+    beyond = each["beyond_paper"]
     if beyond is not None:
         return {row: ", ".join(beyond) or "nothing"}
     if is_own_policy(each["name"]):

@@ -22,7 +22,9 @@ from swarm_mj.system.writing import Output, check_outputs, write_bytes
 if TYPE_CHECKING:
     from swarm_mj.replay.footage import Footage
 
-VIDEO, PICTURE = "video", "picture"  # headings of the help
+# Headings of the help.
+VIDEO = "video"
+PICTURE = "picture"
 _video = partial(setting, group=VIDEO)
 OWN_TIME = f"the mission's own time, {view.LONGEST_S:g} at most"
 BARE = "the bare arena"
@@ -93,7 +95,11 @@ def run(options: ReplayOptions) -> int:
 def _check_together(options: ReplayOptions) -> None:
     """Raise ValueError for options that have no use together, or no use alone."""
     ways = {"--web": options.web, "--video": options.video, "--picture": options.picture}
-    if len(named := [way for way, value in ways.items() if value]) > 1:
+    named: list[str] = []
+    for way, value in ways.items():
+        if value:
+            named.append(way)
+    if len(named) > 1:
         raise ValueError(f"{named[0]} is not allowed with {named[1]}; leave one out")
     if not options.video and (options.size or options.seconds or options.fps):
         raise ValueError("--size, --seconds and --fps are of videos; name one by --video")
@@ -142,7 +148,8 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
         content = make_video(footages, suffix, style, bar.advance)
     raise_if_interrupted()  # an encoder may have swallowed it
     write_bytes(video, content)
-    number, name = style.num_frames, shlex.quote(str(video))
+    number = style.num_frames
+    name = shlex.quote(str(video))
     about = f"{number / style.fps:.3g} s, {number} pictures of {style.width} by {style.height}"
     plain_console().print(f"Wrote {name}: {about}, {len(content) / 1e6:.1f} MB")
     return 0
@@ -152,16 +159,22 @@ def _style(options: ReplayOptions, suffix: str) -> view.VideoStyle:
     """Return the style asked for; raise ValueError for what the kind of file cannot have."""
     style = view.DEFAULTS[suffix]
     if options.size:
-        match = re.fullmatch(r"(\d{1,5})x(\d{1,5})", options.size)
-        width, height = (int(number) for number in match.groups()) if match else (0, 0)
-        low, high = 160, 3840  # of a side
+        low = 160  # of a side
+        high = 3840
+        width = 0  # of what is no size
+        height = 0
+        match = re.fullmatch(r"(?P<width>\d{1,5})x(?P<height>\d{1,5})", options.size)
+        if match:
+            width = int(match["width"])
+            height = int(match["height"])
         if not (low <= width <= high and low <= height <= high):
             allowed = f"WIDTHxHEIGHT from {low}x{low} to {high}x{high}"
             raise ValueError(f"size must be {allowed}, not {options.size}")
         if suffix == ".mp4" and (width % 2 or height % 2):  # H.264 halves the colours' resolution
             raise ValueError(f"size of an MP4 must be even numbers, not {options.size}")
         style = replace(style, width=width, height=height)
-    seconds, fps = options.seconds or style.seconds, options.fps or style.fps
+    seconds = options.seconds or style.seconds
+    fps = options.fps or style.fps
     return view.fitted(replace(style, seconds=seconds, fps=fps), suffix)
 
 

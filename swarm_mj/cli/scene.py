@@ -40,7 +40,8 @@ def run(options: SceneOptions) -> int:
     spec = compose(mission, start=swarm.states, scene=swarm.scene)
     spec.compile()
     write_text(options.out, spec.to_xml())
-    side, file = f"{mission.side_m:.0f} m", shlex.quote(str(options.out))
+    side = f"{mission.side_m:.0f} m"
+    file = shlex.quote(str(options.out))
     plain_console().print(
         f"Wrote {options.out}: {mission.num_robots} robots on {side} by {side}\n"
         "The viewer opens on their start; Load key also gives them their velocities.\n"

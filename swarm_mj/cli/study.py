@@ -7,6 +7,7 @@ from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import missions_of
+from swarm_mj.cli.options import Given
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, MAX_REGIMES, Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
@@ -133,7 +134,7 @@ def _study(tables: dict[str, Any], *, is_trusted: bool) -> Study:
     return Study(**own, regimes=tuple(dict.fromkeys(regimes)))
 
 
-def _check_names_no_code(own: dict[str, Any]) -> None:
+def _check_names_no_code(own: Given) -> None:
     """Raise ValueError if a file's table [study] names users' code, which making it would run."""
     named = [name for name in own["policies"] if registry.is_own_policy(name)]
     named += [str(name) for name in own.get("features", ())]
@@ -146,7 +147,7 @@ def _check_names_no_code(own: dict[str, Any]) -> None:
         )
 
 
-def _values(place: str, given: dict[str, Any], kind: type[Any]) -> dict[str, Any]:
+def _values(place: str, given: Given, kind: type[Any]) -> Given:
     """Return a table's values by the names of a dataclass's fields; lists are tuples.
 
     A field of several values may be given as a single text.
@@ -154,7 +155,7 @@ def _values(place: str, given: dict[str, Any], kind: type[Any]) -> dict[str, Any
     check_kind(place, given, dict, "num_robots = 20")
     types = {spec.name: spec.type for spec in fields(kind)}
     check_names(place, given, types, former_names(kind))
-    values: dict[str, Any] = {}
+    values: Given = {}
     for name, value in given.items():
         takes_many = get_origin(types[name]) is tuple
         if takes_many and isinstance(value, str):  # one policy, say, in place of a list of one

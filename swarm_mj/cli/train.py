@@ -3,13 +3,13 @@
 import shlex
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any, ClassVar, get_args
+from typing import ClassVar, get_args
 
 from rich.console import Console
 
 from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags
-from swarm_mj.cli.options import nested
+from swarm_mj.cli.options import Given, nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.learning import run_folder
 from swarm_mj.learning.run_folder import Limits, TrainingRun
@@ -51,7 +51,7 @@ class TrainOptions:
         None, "begin with a stored policy", metavar="POLICY", reads=the_file
     )
     yes: bool = setting(False, YES)
-    settings: dict[str, Any] = nested(train_settings.setting_options, train_settings.given_settings)
+    settings: Given = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()
 
 
@@ -112,7 +112,8 @@ def _begun_run(options: TrainOptions) -> TrainingRun:
 
 def _new_run(options: TrainOptions) -> TrainingRun:
     run_folder.check_new(options.out)
-    init, given = options.init, options.settings
+    init = options.init
+    given = options.settings
     training = train_settings.asked_settings(given, read_policy(init)[1] if init else None, init)
     credit = training.credit_assignment
     limits = Limits(decisions=run_folder.BUDGETS[credit], patience=run_folder.PATIENCE[credit])
@@ -124,13 +125,18 @@ def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
     """Return a run's limits, changed by the options that were given."""
     if options.budget is not None or options.minutes is not None:  # either replaces both
         limits = replace(limits, decisions=options.budget, minutes=options.minutes)
-    others = {"patience": options.patience, "replay_every": options.replay_every}
-    return replace(limits, **{name: x for name, x in others.items() if x is not None})
+    if options.patience is not None:
+        limits = replace(limits, patience=options.patience)
+    if options.replay_every is not None:
+        limits = replace(limits, replay_every=options.replay_every)
+    return limits
 
 
 def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) -> None:
-    training, console = asked.training, plain_console()
-    credit, sizes = training.credit_assignment, ", ".join(map(str, training.robots))
+    training = asked.training
+    console = plain_console()
+    credit = training.credit_assignment
+    sizes = ", ".join(map(str, training.robots))
     rows = {
         **report(asked, progress),
         "decisions": f"{progress.decisions:,}",

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.cli.mission_options import FLAGS, about_option, check_in_use
-from swarm_mj.cli.options import Option, flags_of
+from swarm_mj.cli.options import Given, Option, flags_of
 from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
 from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
@@ -53,7 +53,7 @@ def setting_options() -> Iterator[Option]:
         yield Option(spec, about, place, is_nested=True)
 
 
-def given_settings(given: dict[str, Any]) -> dict[str, Any]:
+def given_settings(given: Given) -> Given:
     """Return the settings that were given, by their places; a value of several counts once."""
     settings = {}
     for place in SPECS:
@@ -69,7 +69,7 @@ def given_settings(given: dict[str, Any]) -> dict[str, Any]:
 
 
 def asked_settings(
-    given: dict[str, Any], init: GnnConfig | None = None, init_path: Path | None = None
+    given: Given, init: GnnConfig | None = None, init_path: Path | None = None
 ) -> Training:
     """Return the settings of a new run: the usual ones of its credit, changed by those given.
 
@@ -105,7 +105,7 @@ def asked_settings(
     return training
 
 
-def _mission(asked: dict[str, Any], num_robots: int) -> Mission:
+def _mission(asked: Given, num_robots: int) -> Mission:
     """Return what is flown; raise ValueError for an option that would change nothing."""
     usual = {"task": "stationary", "num_robots": num_robots}
     mission = make_mission(**usual | asked)
@@ -113,9 +113,7 @@ def _mission(asked: dict[str, Any], num_robots: int) -> Mission:
     return mission
 
 
-def _begun_with(
-    training: Training, init: GnnConfig, policy: str, given: dict[str, Any]
-) -> Training:
+def _begun_with(training: Training, init: GnnConfig, policy: str, given: Given) -> Training:
     """Return settings that fit a stored policy; raise ValueError if those given say otherwise."""
     training = replace(
         training,
@@ -123,13 +121,16 @@ def _begun_with(
         features=init.features,
         silence_logit=init.silence_logit,
     )
-    of_network = {at: x for at, x in given.items() if at.startswith(("features", "network"))}
+    of_network: Given = {}
+    for place, value in given.items():
+        if place.startswith(("features", "network")):
+            of_network[place] = value
     refuse_others(of_network, training, f"the {policy}")
     check_named(init.features, own_names(given), policy)
     return training
 
 
-def own_names(given: dict[str, Any]) -> list[str]:
+def own_names(given: Given) -> list[str]:
     """Return the names of custom components and features among settings that were given."""
     names: list[str] = []
     for place, value in given.items():
@@ -146,7 +147,7 @@ def load_own(features: str, training: Training) -> None:
     training.components.made(training.mission)
 
 
-def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None:
+def refuse_others(given: Given, training: Training, whose: str) -> None:
     """Raise ValueError if a setting contradicts a run, or the policy that it begins with."""
     for place, value in given.items():
         stored = attrgetter(place)(training)
@@ -155,9 +156,9 @@ def refuse_others(given: dict[str, Any], training: Training, whose: str) -> None
             raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
 
 
-def _part(part: str, given: dict[str, Any]) -> dict[str, Any]:
+def _part(part: str, given: Given) -> Given:
     """Return the settings given of one part, by their names in it."""
-    settings: dict[str, Any] = {}
+    settings: Given = {}
     for place, value in given.items():
         owner, _, name = place.rpartition(".")
         if owner == part:

@@ -46,11 +46,22 @@ def credits_of(
     # Without shapes: they would be made anew in every window, which takes as long as the replay.
     def replayed(rows: np.ndarray, recipient: np.ndarray) -> np.ndarray:
         """Return the gains of the windows of these missions with other recipients [windows]."""
-        fresh, its = snapshot_channel(channel), None if is_active is None else is_active[rows]
-        return gain(timestamp, position_m[rows], recipient, fresh, now[rows], rows, its)
+        fresh = snapshot_channel(channel)
+        its = None if is_active is None else is_active[rows]
+        return gain(
+            timestamp=timestamp,
+            position_m=position_m[rows],
+            recipient=recipient,
+            channel=fresh,
+            now=now[rows],
+            mission=rows,
+            is_active=its,
+        )
 
     at_once = isinstance(channel, (FreeSpaceRadio, VaryingChannel))
-    return (_credits_at_once if at_once else _credits_in_turn)(recipient, replayed)
+    if at_once:
+        return _credits_at_once(recipient, replayed)
+    return _credits_in_turn(recipient, replayed)
 
 
 def _credits_at_once(
@@ -73,8 +84,10 @@ def _credits_in_turn(
 ) -> Float[np.ndarray, "B N"]:
     """Replay B missions at a time: a user's channel meets them as in flight, draws included."""
     num_missions, num_robots = recipient.shape
-    robots, missions = np.arange(num_robots), np.arange(num_missions)
-    together, sends = replayed(missions, recipient), recipient != robots
+    robots = np.arange(num_robots)
+    missions = np.arange(num_missions)
+    together = replayed(missions, recipient)
+    sends = recipient != robots
     credit = np.zeros(recipient.shape)
     turn = np.cumsum(sends, axis=1) * sends  # 1 for the first sender of a mission, and so on
     for n in range(1, int(turn.max(initial=0)) + 1):
@@ -102,14 +115,22 @@ def gain(
 
     Arguments are as in `credits_of`, one row a window; `mission` is that of the T it starts from.
     """
-    first, second = (channel_at(channel, now + n * SLOT_WINDOWS, mission) for n in (1, 2))
+    first = channel_at(channel, now + SLOT_WINDOWS, mission)
+    second = channel_at(channel, now + 2 * SLOT_WINDOWS, mission)
     heard = checked_decode(first, position_m, recipient)
     silence(heard, is_active)
     answered = respondents(Phase(recipient=recipient, heard=heard))
     heard_answer = checked_decode(second, position_m, answered)
     silence(heard_answer, is_active)
     gained = np.empty(len(mission))
-    _replay(timestamp, mission, heard, heard_answer, now, gained)
+    _replay(
+        timestamp=timestamp,
+        mission=mission,
+        heard=heard,
+        heard_answer=heard_answer,
+        now=now,
+        gained=gained,
+    )
     return gained
 
 

@@ -96,7 +96,8 @@ class SwarmPhysics(mujoco.Physics):
         return self.swarm.mission.window_s
 
     def _show(self) -> None:
-        mission, states = self.swarm.mission, self.swarm.states
+        mission = self.swarm.mission
+        states = self.swarm.states
         self.data.time = self.swarm.now[0] * mission.window_s
         self.data.qpos[:] = states.position_m.ravel()
         self.data.qvel[:] = states.velocity_mps.ravel()
@@ -129,7 +130,10 @@ class SwarmTask(_Task):
     def get_observation(self, physics: SwarmPhysics) -> OrderedDict[str, np.ndarray | np.float64]:
         """Return the buffers (II-B), [i, j]: what i knows about j; and the time [windows]."""
         buffers = vars(physics.swarm.buffers)
-        known = {name: array[0].copy() for name, array in buffers.items() if array.ndim > 1}
+        known: dict[str, np.ndarray] = {}
+        for name, array in buffers.items():
+            if array.ndim > 1:
+                known[name] = array[0].copy()
         return OrderedDict(known, now=physics.swarm.now[0])
 
     def get_reward(self, physics: SwarmPhysics) -> float:

@@ -23,7 +23,8 @@ from swarm_mj.replay.view import has_display
 from swarm_mj.system.fields import check_choice
 
 MODES = ("rgb_array", "human")
-WIDTH, HEIGHT = 800, 600  # of a picture [pixels]
+WIDTH = 800  # of a picture [pixels]
+HEIGHT = 600
 
 
 def rendering(mission: Mission, modes: Sequence[str]) -> dict[str, Any]:
@@ -47,7 +48,8 @@ class Screen:
         """Take a render mode, or None for no pictures; raises ValueError for an unknown one."""
         if mode is not None:
             check_choice("render_mode", mode, modes)
-        self.mode, self._shown_s = mode, 0.0
+        self.mode = mode
+        self._shown_s = 0.0
         self._renderer: SceneRenderer | None = None
         self._viewer: SceneViewer | None = None
 
@@ -98,7 +100,8 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
         """Take a mission or its task, and options of `make_batch`; raises as that does."""
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_team_batch(mission, **options)
-        self._screen, self.render_mode = Screen(render_mode), render_mode
+        self._screen = Screen(render_mode)
+        self.render_mode = render_mode
         self.metadata = rendering(self.batch.mission, modes_here())
         self.observation_space, self.action_space = team_spaces(self.batch)
 

@@ -48,8 +48,10 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         batch = make_team_batch(mission, num_envs, **options)
         self.num_envs = num_envs
         self.autoreset_mode = AutoresetMode(autoreset_mode)  # TorchRL looks for it here
-        self._screen, self.render_mode = Screen(render_mode, MODES), render_mode
-        self._mission, self._options = mission, options
+        self._screen = Screen(render_mode, MODES)
+        self.render_mode = render_mode
+        self._mission = mission
+        self._options = options
         self.metadata = rendering(batch.mission, MODES) | {"autoreset_mode": self.autoreset_mode}
         # Of each environment: the batch that flies it, and its row there.
         self._batches = np.full(num_envs, batch, dtype=object)
@@ -163,9 +165,12 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Draw all missions, in the mode "rgb_array"; raises OSError without OpenGL."""
         if self.render_mode is None:
             return None
-        flown = zip(self._batches, self._rows.tolist(), strict=True)
-        pictures = (self._screen.picture(batch, row) for batch, row in flown)
-        return tuple(each for each in pictures if each is not None)
+        pictures: list[np.ndarray] = []
+        for batch, row in zip(self._batches, self._rows.tolist(), strict=True):
+            picture = self._screen.picture(batch, row)
+            if picture is not None:
+                pictures.append(picture)
+        return tuple(pictures)
 
     def close_extras(self, **_: Any) -> None:
         """Give back what pictures took."""
@@ -195,7 +200,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         if batch.num_missions != envs.size or not np.array_equal(flies, envs):
             batch = make_team_batch(self._mission, envs.size, **self._options)
         batch.restart(begun)  # in the swarm that flew exactly these, if there is one
-        self._batches[envs], self._rows[envs] = batch, np.arange(envs.size)
+        self._batches[envs] = batch
+        self._rows[envs] = np.arange(envs.size)
         self._is_over[envs] = False
         self._note(infos, batch)
 
@@ -213,7 +219,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         for name, each in batch.infos().items():
             own = infos.setdefault(name, np.zeros(self.num_envs, dtype=each.dtype))
             is_own = infos.setdefault(f"_{name}", np.zeros(self.num_envs, dtype=np.bool_))
-            own[envs], is_own[envs] = each[rows], True
+            own[envs] = each[rows]
+            is_own[envs] = True
 
     def _shown(self) -> Observation:
         """Return the user's own arrays: new ones, or copies of what `reset_mask` shows again."""

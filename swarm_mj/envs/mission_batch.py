@@ -31,7 +31,8 @@ Info = dict[str, Any]
 # A team's reward is minus a cost. "credit" is each robot's own.
 REWARDS = (*BY_REWARD, "credit")
 # Training and environments draw seeds from here on, so small ones are left for evaluations.
-FIRST_TRAINING_SEED, LAST_TRAINING_SEED = 2**40, 2**62
+FIRST_TRAINING_SEED = 2**40
+LAST_TRAINING_SEED = 2**62
 
 
 class MissionBatch:

@@ -2,12 +2,12 @@
 
 import copy
 from numbers import Integral
-from typing import Any, Unpack
+from typing import Any, NamedTuple, Unpack
 
 import numpy as np
 from gymnasium import spaces
 from gymnasium.vector.utils import batch_space
-from jaxtyping import Float32
+from jaxtyping import Float, Float32
 
 from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
@@ -23,7 +23,21 @@ from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check_choice
 
-NUM_OWN = 5  # numbers of a robot itself in `truth`: x, y, their velocities, whether it is active
+
+class RobotTruth(NamedTuple):
+    """The numbers of each robot in `truth`, in this order; all is normalised, and has no unit."""
+
+    position: Float[np.ndarray, "B N 2"]  # by half the side of the area
+    velocity: Float[np.ndarray, "B N 2"]  # by the maximum
+    is_active: Float[np.ndarray, "B N 1"]  # 1, or 0 once it has failed
+    age: Float[np.ndarray, "B N N"]  # of what it knows of each robot: 0 is now; 1: never known
+
+
+def num_truths(num_robots: int) -> int:
+    """Return how many numbers `truth` has: the share that is flown, then those of `RobotTruth`."""
+    position = velocity = 2
+    is_active = 1
+    return 1 + num_robots * (position + velocity + is_active + num_robots)
 
 
 class BatchOptions(TaskAndFields, total=False):
@@ -169,7 +183,7 @@ def truth_space(mission: Mission) -> spaces.Box:
     """Return the space of `truth`: all numbers are normalised, and none has a unit."""
     num_robots = mission.num_robots
     most = largest_feature(mission)
-    return spaces.Box(-most, most, (1 + num_robots * (NUM_OWN + num_robots),), np.float32)
+    return spaces.Box(-most, most, (num_truths(num_robots),), np.float32)
 
 
 def truth(batch: MissionBatch) -> Float32[np.ndarray, "B S"]:
@@ -181,17 +195,16 @@ def truth(batch: MissionBatch) -> Float32[np.ndarray, "B S"]:
     the area, its velocity by the maximum, 1 if it is active, and the age of what it knows of each
     robot, on the scale of the extended features.
     """
-    mission, swarm = batch.mission, batch.flown
+    mission = batch.mission
+    swarm = batch.flown
     age = np.minimum(swarm.now[:, np.newaxis, np.newaxis] - swarm.buffers.timestamp, LONG_WINDOWS)
     log_age = np.log1p(age) / np.log1p(LONG_WINDOWS)  # 0 is now, 1 is `LONG_WINDOWS` ago
-    robots = np.concatenate(
-        [
-            swarm.states.position_m / mission.half_side_m,
-            swarm.states.velocity_mps / (mission.max_velocity_mps or 1.0),
-            batch.is_active[..., np.newaxis],
-            np.where(swarm.buffers.is_known, log_age, 1.0),  # 1 is also what was never known
-        ],
-        axis=-1,
+    robots = RobotTruth(
+        position=swarm.states.position_m / mission.half_side_m,
+        velocity=swarm.states.velocity_mps / (mission.max_velocity_mps or 1.0),
+        is_active=batch.is_active[..., np.newaxis].astype(np.float64),
+        age=np.where(swarm.buffers.is_known, log_age, 1.0),
     )
     flown = swarm.now[:, np.newaxis] / mission.num_windows
-    return np.hstack([flown, robots.reshape(len(flown), -1)]).astype(np.float32)
+    by_robot = np.concatenate(robots, axis=-1)
+    return np.hstack([flown, by_robot.reshape(len(flown), -1)]).astype(np.float32)

@@ -47,7 +47,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """
         EzPickle.__init__(self, mission, render_mode=render_mode, **options)
         self.batch = make_batch(mission, **options)
-        self._screen, self.render_mode = Screen(render_mode), render_mode
+        self._screen = Screen(render_mode)
+        self.render_mode = render_mode
         self.metadata = NAME | rendering(self.batch.mission, modes_here())
         self.possible_agents = [f"robot_{i}" for i in range(self.batch.mission.num_robots)]
         self.agents: list[str] = []
@@ -152,7 +153,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
             return {}, {}, {}, {}, {}
         recipient = np.array([chosen])
         check_robots("action", recipient, self.batch.shape)
-        reward, is_over = self.batch.step(recipient)[0], self.batch.is_over
+        reward = self.batch.step(recipient)[0]
+        is_over = self.batch.is_over
         seen, infos = self._seen()
         rewards = {agent: float(reward[self._robot[agent]]) for agent in self.agents}
         ended = {agent: not self.batch.is_active[0, self._robot[agent]] for agent in self.agents}
@@ -190,11 +192,13 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
     def _seen(self) -> tuple[dict[str, Observation], dict[str, Info]]:
         self._screen.update(self.batch)
         seen, info = self.batch.first()
-        views = {
-            agent: {name: rows[self._robot[agent]] for name, rows in seen.items()}
-            for agent in self.agents
-        }
-        return views, {agent: dict(info) for agent in self.agents}
+        views: dict[str, Observation] = {}
+        infos: dict[str, Info] = {}
+        for agent in self.agents:
+            robot = self._robot[agent]
+            views[agent] = {name: rows[robot] for name, rows in seen.items()}
+            infos[agent] = dict(info)
+        return views, infos
 
 
 def parallel_env(

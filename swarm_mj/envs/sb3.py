@@ -7,6 +7,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any, Unpack
 
+import numpy as np
 import stable_baselines3
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.torch_layers import CombinedExtractor
@@ -103,11 +104,10 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
     batch = _trained_on(model)
     layers = _actor(model)
     linear = [each for each in layers if isinstance(each, nn.Linear)]
-    weights = {
-        f"{n}.{name}": tensor.detach().cpu().numpy().copy()
-        for n, layer in enumerate(linear)
-        for name, tensor in layer.named_parameters()
-    }
+    weights: dict[str, np.ndarray] = {}
+    for n, layer in enumerate(linear):
+        for name, tensor in layer.named_parameters():
+            weights[f"{n}.{name}"] = tensor.detach().cpu().numpy().copy()
     network = MlpShape(
         num_robots=batch.mission.num_robots,
         features=batch.features,
@@ -130,7 +130,8 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
 
 def _trained_on(model: BaseAlgorithm) -> MissionBatch:
     """Return a model's missions; raises ValueError if no policy can be made of it."""
-    env, kind = model.get_env(), type(model).__name__
+    env = model.get_env()
+    kind = type(model).__name__
     if not hasattr(model.policy, "action_dist"):
         raise ValueError(
             f"a policy is made of an actor that draws recipients, and {kind} has none; train PPO, "

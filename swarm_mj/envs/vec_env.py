@@ -34,7 +34,9 @@ class SwarmVecEnv(VecEnv):
         action_space: spaces.Space,
     ) -> None:
         """Take missions that have not begun, and whether an agent is a robot or a team."""
-        self.batches, self.agent, self.render_mode = list(batches), agent, None
+        self.batches = list(batches)
+        self.agent = agent
+        self.render_mode = None
         sizes = [batch.num_missions * self._per_mission(batch) for batch in batches]
         ends = np.cumsum(sizes).tolist()
         self._envs = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
@@ -43,7 +45,9 @@ class SwarmVecEnv(VecEnv):
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Let the next reset begin the missions of seeds from this one on; return each one's."""
-        missions = [batch for batch in self.batches for _ in range(batch.num_missions)]
+        missions: list[MissionBatch] = []  # the batch of each mission
+        for batch in self.batches:
+            missions += [batch] * batch.num_missions
         self._given = seeds_from(seed, len(missions))
         self._rngs = [seeding.np_random(each)[0] for each in self._given]
         per_mission = [self._per_mission(batch) for batch in missions]
@@ -62,7 +66,8 @@ class SwarmVecEnv(VecEnv):
 
     def step_wait(self) -> VecEnvStepReturn:
         """Fly one window; after the last one, others begin. Bad actions are a ValueError."""
-        reward, done = np.zeros(self.num_envs, np.float32), np.zeros(self.num_envs, np.bool_)
+        reward = np.zeros(self.num_envs, np.float32)
+        done = np.zeros(self.num_envs, np.bool_)
         for batch, envs in zip(self.batches, self._envs, strict=True):
             # Teams smaller than the largest one are padded with columns of silence.
             recipient = self._actions[envs].reshape(batch.num_missions, -1)
@@ -71,14 +76,16 @@ class SwarmVecEnv(VecEnv):
             done[envs] = batch.is_over
         # Of this window: a restart, below, forgets them.
         self.costs = [batch.costs for batch in self.batches]
-        seen, infos = self._observe(), self._infos()
+        seen = self._observe()
+        infos = self._infos()
         if done.any():
             for env in np.flatnonzero(done & self._is_truncated()):
                 last = {name: rows[env] for name, rows in seen.items()}
                 infos[env] |= {"terminal_observation": last, "TimeLimit.truncated": True}
             for n in np.flatnonzero([batch.is_over for batch in self.batches]).tolist():
                 self._begin(n)
-            seen, self.reset_infos = self._observe(), self._infos()
+            seen = self._observe()
+            self.reset_infos = self._infos()
         return seen, reward, done, infos
 
     def action_masks(self) -> Bool[np.ndarray, "E A"]:
@@ -135,10 +142,13 @@ class SwarmVecEnv(VecEnv):
 
     def _observe(self) -> Observation:
         seen = [batch.observation for batch in self.batches]
-        together = {name: np.concatenate([each[name] for each in seen]) for name in seen[0]}
-        if self.agent == "team":
-            return together
-        return {name: rows.reshape(-1, *rows.shape[2:]) for name, rows in together.items()}
+        together: Observation = {}
+        for name in seen[0]:
+            rows = np.concatenate([each[name] for each in seen])
+            if self.agent == "robot":
+                rows = rows.reshape(-1, *rows.shape[2:])
+            together[name] = rows
+        return together
 
     def _per_mission(self, batch: MissionBatch) -> int:
         return batch.mission.num_robots if self.agent == "robot" else 1

@@ -1,6 +1,6 @@
 """A batch of missions: one policy in one regime, flown side by side, and what each cost."""
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
 from typing import Any, TypeVar
 
@@ -10,7 +10,8 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters
-from swarm_mj.policies.registry import make_policy
+from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
+from swarm_mj.policies.registry import make_policy_with
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import Packets, WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
@@ -29,7 +30,7 @@ class Batch:
     """The work of one process at a time."""
 
     policy: str
-    how: Mapping[str, Any]  # arguments of `make_policy` beside it and the mission
+    arguments: PolicyArguments = USUAL
     components: Components = Components()  # by name, as they are made in other processes
     parameters: Parameters | None = None  # what it must have, where that is known
     mission: Mission
@@ -174,7 +175,7 @@ def fly_batch(batch: Batch) -> BatchCosts:
     or a part of the user's own raised.
     """
     swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
-    policy = make_policy(batch.policy, batch.mission, **batch.how)
+    policy = make_policy_with(batch.arguments, batch.policy, batch.mission)
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"

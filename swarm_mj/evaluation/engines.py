@@ -17,7 +17,7 @@ from itertools import islice
 from multiprocessing import get_context, resource_tracker
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from swarm_mj.evaluation.study import Study
 from swarm_mj.policies.registry import stored_policies
@@ -27,8 +27,12 @@ from swarm_mj.system.packages import code_digest, need
 from swarm_mj.system.processes import SAFE_PATH, guard
 from swarm_mj.system.user_code import is_users
 
-Work = Callable[[Any], Any]
-Done = Generator[tuple[int, Any]]  # pieces' indices and products
+Piece = TypeVar("Piece")  # of a study's work
+Product = TypeVar("Product")  # what was made of a piece
+Work = Callable[[Piece], Product]
+Done = Generator[tuple[int, Product]]  # pieces' indices and products
+Share = Sequence[tuple[int, Piece]]  # a job's pieces, with their indices
+Outcome = list[tuple[int, Product]] | Exception  # a job's products, or what went wrong
 
 # Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
 # look for a window system, which it does by a program that complains if it is left.
@@ -37,7 +41,7 @@ SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS",
 SURROUNDINGS |= {"MUJOCO_GL": "disable", SAFE_PATH: "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
-GROUP: dict[str, Any] = {"group": "processes that fly missions"}
+GROUP = "processes that fly missions"  # the options' heading
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
 
@@ -46,7 +50,7 @@ ATTEMPTS = 3  # how often a job is submitted
 class Engine(Protocol):
     """Does pieces of work in other processes, wherever they are."""
 
-    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
+    def run(self, work: Work[Piece, Product], pieces: Sequence[Piece]) -> Done[Product]:
         """Do all pieces; yield each one's index and product once, in the order they are done.
 
         The processes import `work`; pieces and products are pickled on the way. They end with the
@@ -62,7 +66,7 @@ class Local:
 
     num_jobs: int = 1
 
-    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
+    def run(self, work: Work[Piece, Product], pieces: Sequence[Piece]) -> Done[Product]:
         """Do all pieces, as `Engine.run` says."""
         num_jobs = min(self.num_jobs, len(pieces))
         if num_jobs <= 1:
@@ -95,19 +99,22 @@ class Ray:
     address: str | None = None
     files: Sequence[Path] = ()  # that pieces name
 
-    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
+    def run(self, work: Work[Piece, Product], pieces: Sequence[Piece]) -> Done[Product]:
         """Do all pieces, as `Engine.run` says."""
         os.environ.update(QUIET)
         ray: Any = import_module("ray")
-        how: dict[str, Any] = {"address": "local", "num_cpus": self.num_jobs}
-        if self.address:
-            how = {"address": self.address}
         try:
             # Its end puts back the handlers of signals that Ray replaces.
             with deferred_interrupt() as is_interrupted, TemporaryDirectory() as parts:
                 _copy_parts(parts, self.files)
-                how["runtime_env"] = {"working_dir": parts, "env_vars": SURROUNDINGS}
-                ray.init(**how, logging_level="ERROR", log_to_driver=False)
+                ray.init(
+                    address=self.address or "local",
+                    # A cluster that runs already has the processors that it has.
+                    num_cpus=None if self.address else self.num_jobs,
+                    runtime_env={"working_dir": parts, "env_vars": SURROUNDINGS},
+                    logging_level="ERROR",
+                    log_to_driver=False,
+                )
             if is_interrupted():
                 raise KeyboardInterrupt
             do = ray.remote(max_retries=-1)(_do)
@@ -136,7 +143,7 @@ class Slurm:
     num_jobs: int = 1
     cluster: str = "slurm"  # or submitit's "local": processes here
 
-    def run(self, work: Work, pieces: Sequence[Any]) -> Done:
+    def run(self, work: Work[Piece, Product], pieces: Sequence[Piece]) -> Done[Product]:
         """Do all pieces, as `Engine.run` says."""
         submitit: Any = import_module("submitit")
         folder = mkdtemp(prefix="slurm-", dir=Path.cwd())  # which all machines see
@@ -164,7 +171,30 @@ class Slurm:
         raise OSError(f"{len(left)} pieces failed {ATTEMPTS} times; the logs are in {folder}")
 
 
-def _finished(jobs: Sequence[Any], completed: Iterable[Any]) -> Done:
+@runtime_checkable
+class SlurmJob(Protocol[Product]):
+    """A job of submitit's, as far as it is used here."""
+
+    def exception(self) -> Exception | None:
+        """Return why the job failed, if it did."""
+        ...
+
+    def result(self) -> Outcome[Product]:
+        """Return what the job brought."""
+        ...
+
+    def done(self) -> bool:
+        """Return whether it has ended."""
+        ...
+
+    def cancel(self, check: bool = True) -> None:
+        """End it."""
+        ...
+
+
+def _finished(
+    jobs: Sequence[SlurmJob[Product]], completed: Iterable[SlurmJob[Product]]
+) -> Done[Product]:
     """Yield what submitit's jobs did; cancel those that are left if the generator is closed."""
     try:
         for job in completed:
@@ -179,7 +209,7 @@ def _finished(jobs: Sequence[Any], completed: Iterable[Any]) -> Done:
 _worker_code = cache(code_digest)  # a worker hashes its code once, not once a piece
 
 
-def _do(work: Work, code: str, share: Sequence[tuple[int, Any]]) -> list[Any] | Exception:
+def _do(work: Work[Piece, Product], code: str, share: Share[Piece]) -> Outcome[Product]:
     """Return pieces' indices and products in another process, or what went wrong."""
     if _worker_code() != code:
         other = f"{socket.gethostname()} has other code, digest {_worker_code():.12}"
@@ -191,7 +221,7 @@ def _do(work: Work, code: str, share: Sequence[tuple[int, Any]]) -> list[Any] | 
         return error
 
 
-def _unpacked(done: list[Any] | Exception) -> list[Any]:
+def _unpacked(done: Outcome[Product]) -> list[tuple[int, Product]]:
     if isinstance(done, Exception):
         raise done
     return done
@@ -199,8 +229,11 @@ def _unpacked(done: list[Any] | Exception) -> list[Any]:
 
 def _copy_parts(folder: str, files: Sequence[Path]) -> None:
     """Copy modules of the user's that are loaded, and files, from the current folder."""
-    own = [name for name in list(sys.modules) if is_users(name) and not name.startswith("swarm_mj")]
-    for path in (*files, *(str(sys.modules[name].__file__) for name in own)):
+    paths = list(files)
+    for name, module in list(sys.modules.items()):
+        if is_users(name) and not name.startswith("swarm_mj"):
+            paths.append(Path(str(module.__file__)))
+    for path in paths:
         target = Path(folder, os.path.relpath(path))
         if os.path.isfile(path) and ".." not in target.parts:  # torch's are no files
             target.parent.mkdir(parents=True, exist_ok=True)
@@ -211,9 +244,11 @@ def _copy_parts(folder: str, files: Sequence[Path]) -> None:
 class EngineOptions:
     """Who flies a study's missions."""
 
-    jobs: int = setting(1, "how many at once", low=1, high=256, is_common=True, **GROUP)
-    engine: str = setting("local", "who starts them", choices=("local", "ray", "slurm"), **GROUP)
-    address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", **GROUP)
+    jobs: int = setting(1, "how many at once", low=1, high=256, is_common=True, group=GROUP)
+    engine: str = setting(
+        "local", "who starts them", choices=("local", "ray", "slurm"), group=GROUP
+    )
+    address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", group=GROUP)
 
     @property
     def jobs_here(self) -> int:

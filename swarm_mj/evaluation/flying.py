@@ -10,7 +10,6 @@ import hashlib
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
-from typing import Any
 
 import msgspec
 import numpy as np
@@ -76,19 +75,21 @@ def progress_path(output: Path) -> Path:
     return output.with_name(f"{output.name}.progress")
 
 
-def start_progress(path: Path, header: dict[str, Any]) -> None:
+def start_progress(path: Path, header: Mapping[str, object]) -> None:
     """Begin a progress file, in place of any other; raise OSError if that cannot be."""
     write_bytes(path, _first_line(msgspec.json.encode(header)))
 
 
-def append_progress(path: Path, header: dict[str, Any], index: int, costs: BatchCosts) -> None:
+def append_progress(
+    path: Path, header: Mapping[str, object], index: int, costs: BatchCosts
+) -> None:
     """Add what a batch cost, by its index among the study's; raise OSError if that cannot be."""
     lists = {name: numbers.tolist() for name, numbers in vars(costs).items()}
     text = msgspec.json.encode([index, lists])
     append_bytes(path, _later_line(msgspec.json.encode(header), text))
 
 
-def resume_progress(path: Path, header: dict[str, Any]) -> dict[int, BatchCosts]:
+def resume_progress(path: Path, header: Mapping[str, object]) -> dict[int, BatchCosts]:
     """Return what an interrupted evaluation has flown.
 
     A line that was cut off is dropped from the file; it is begun anew if not even its header was

@@ -2,11 +2,11 @@
 
 import json
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import fields
 from pathlib import Path
 from types import NoneType
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 import pandas as pd
@@ -61,7 +61,7 @@ def write_missions(path: Path, evaluated: Sequence[Evaluated]) -> None:
         "baseline": first.baseline,
         "policies and regimes": [config_of(each.result) for each in evaluated],
     }
-    rows: list[dict[str, Any]] = []
+    rows: list[Mapping[str, object]] = []
     for each in evaluated:
         regime = config_of(each.result) | {"policy": each.result.policy}
         for index in range(len(each.aoi)):
@@ -161,7 +161,7 @@ def compared(before: pd.DataFrame, after: pd.DataFrame, cost: MissionCost) -> pd
     for name in REGIME:  # those that tell regimes apart
         if len(both[[*varied, name]].drop_duplicates()) > len(both[varied].drop_duplicates()):
             varied.insert(-1, name)
-    rows: list[dict[str, Any]] = []
+    rows: list[Mapping[str, object]] = []
     for _, missions in both.groupby(varied, dropna=False):
         found = np.array(missions["_merge"])
         is_in_both = found == "both"

@@ -1,28 +1,23 @@
-"""Results of evaluations: their columns, and files of them.
+"""Results of evaluations, and their columns; `results_files` has the files of them.
 
 A new column is a field of `Result`; `table_columns` says which of them are printed.
 """
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable
 from dataclasses import Field, asdict, dataclass, fields
-from pathlib import Path
 from typing import Any, NamedTuple
 
-import msgspec
 import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_column
-from swarm_mj.mission.specification import NOTHING, OPEN, Mission
+from swarm_mj.mission.specification import NOTHING, OPEN
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.radio.words import radio_in_words
-from swarm_mj.system.fields import former_names
-from swarm_mj.system.reading import read_json, read_rows
-from swarm_mj.system.writing import write_csv
+from swarm_mj.system.reading import read_json
 
 CARRIES_MORE = "carry more than T, M, P"  # said wherever such policies are shown
-MAX_BYTES = 100_000_000  # of a file
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,7 +163,7 @@ class Result:
     config: str = column(lambda own: own.config)
 
 
-def computation(spec: Field[Any]) -> Callable[[Measurements], object]:
+def computation(spec: Field[object]) -> Callable[[Measurements], object]:
     """Return how a column is computed; raise TypeError for one that nothing computes."""
     if HOW not in spec.metadata:
         raise TypeError(
@@ -289,51 +284,3 @@ def config_of(result: Result) -> dict[str, Any]:
         raise ValueError(
             f"config of {result.policy} must be a JSON object, not {result.config!r:.60}"
         ) from error
-
-
-def read_results(path: Path) -> list[Result]:
-    """Return the rows of a file that `swarm-mj evaluate --csv` wrote, one or more, in its order.
-
-    Columns that no result has are ignored, and those that are newer than the file may be missing.
-
-    Args:
-        path: The CSV file.
-
-    Returns:
-        The results, one for each row; an empty cell is None.
-
-    Raises:
-        ValueError: The file cannot be read as such, or has no rows.
-
-    Example:
-        >>> [result.aoi_mean for result in read_results(Path("results.csv"))]  # [windows]
-    """
-    try:
-        rows = read_rows(path, "results file", MAX_BYTES)
-        if not rows:
-            raise ValueError(f"results file {path} has no rows")
-        return [_result(f"results file {path}, line {line}", row) for line, row in rows]
-    except ValueError as error:
-        raise ValueError(f"{error}; make them with `swarm-mj evaluate --csv FILE`") from error
-
-
-def write_results(path: Path, results: Iterable[Result]) -> None:
-    """Write results as the rows of a CSV file, replaced if it exists; None is an empty cell.
-
-    Args:
-        path: The CSV file.
-        results: The rows, in the order in which they are written.
-
-    Raises:
-        OSError: The file cannot be written.
-    """
-    write_csv(path, COLUMNS, (asdict(result) for result in results))
-
-
-def _result(place: str, row: dict[str, str]) -> Result:
-    present = former_names(Mission)
-    cells = {present.get(name, name): cell or None for name, cell in row.items()}
-    try:
-        return msgspec.convert(cells, Result, strict=False)
-    except msgspec.ValidationError as error:
-        raise ValueError(f"{place}: {error}") from error

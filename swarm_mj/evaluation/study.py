@@ -12,6 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Parameters, Policy
+from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.simulation.components import Components, digest
 from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.packages import code_digest, commit, version
@@ -129,7 +130,7 @@ class Study:
             for start in range(0, self.episodes, BATCH_SIZE):
                 batch = Batch(
                     policy=policy,
-                    how=self._how(policy),
+                    arguments=self._arguments(policy),
                     components=self.components,
                     parameters=self.parameters[regime, policy],
                     mission=regime,
@@ -148,18 +149,18 @@ class Study:
 
     def make_policy(self, policy: str, regime: Mission) -> Policy:
         """Make a policy as it is evaluated in a regime; refuse one whose packets never fit."""
-        made = registry.make_policy(policy, regime, **self._how(policy))
+        made = registry.make_policy_with(self._arguments(policy), policy, regime)
         made.packet(regime)
         return made
 
-    def _how(self, policy: str) -> dict[str, Any]:
-        """Return the arguments of `make_policy` but for the policy's name and the mission."""
-        return {
-            "probability": self.probability,
+    def _arguments(self, policy: str) -> PolicyArguments:
+        """Return what changes a policy of the study."""
+        return PolicyArguments(
+            probability=self.probability,
             # The others have no most probable recipient, and refuse to be asked for it.
-            "is_deterministic": self.is_deterministic and registry.is_learned(policy),
-            "features": self.features,
-        }
+            is_deterministic=self.is_deterministic and registry.is_learned(policy),
+            features=self.features,
+        )
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
         """Return the name and the unit of a regime's task cost; None if its controller has none."""

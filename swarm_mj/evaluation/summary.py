@@ -8,7 +8,8 @@ import numpy as np
 
 from swarm_mj.evaluation.batch import BatchCosts, merge
 from swarm_mj.evaluation.measurements import Measurements
-from swarm_mj.evaluation.results import Evaluated, result_of, write_results
+from swarm_mj.evaluation.results import Evaluated, result_of
+from swarm_mj.evaluation.results_files import write_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.registry import flown_name

@@ -2,8 +2,8 @@
 
 import io
 from collections.abc import Iterator, Sequence
+from functools import partial
 from itertools import groupby
-from typing import Any
 
 from rich.box import SIMPLE_HEAD
 from rich.console import Console
@@ -37,21 +37,22 @@ def print_results(
         file: Gets plain text; None is the terminal.
         is_wide: Whether to print all columns, and not only what most people read.
     """
-    how: dict[str, Any] = {
-        "file": file,
-        "force_terminal": None if file is None else False,  # None: rich finds out
-        "force_jupyter": False,
+    console_of_width = partial(
+        Console,
+        file=file,
+        force_terminal=None if file is None else False,  # None: rich finds out
+        force_jupyter=False,
         # Names and numbers stay as they are, even where they look like rich's markup.
-        "highlight": False,
-        "markup": False,
-    }
-    console = Console(**how)
+        highlight=False,
+        markup=False,
+    )
+    console = console_of_width()
     longest = 0
     for result in results:
         for line in _name(result).splitlines():
             longest = max(longest, len(line))
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
-    wide = Console(width=width, **how)
+    wide = console_of_width(width=width)
     columns = WIDE if is_wide else BRIEF
     for regime, group in groupby(results, missions_of):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)

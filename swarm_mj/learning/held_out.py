@@ -97,7 +97,11 @@ def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWin
         names: set[str] = set()
         for cost in LEARNED_COSTS:
             names |= {selection.column(cost, name) for name in selection.REFERENCES}
-        return {name: x for name, x in curve[0].items() if name in names}
+        flown_before: Row = {}
+        for name, value in curve[0].items():
+            if name in names:
+                flown_before[name] = value
+        return flown_before
     columns: Row = {}
     flown_by = selection.reference_missions(training)
     flights = Flights(training=training, on_window=on_window, total=len(flown_by))

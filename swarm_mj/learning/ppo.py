@@ -171,10 +171,11 @@ class GnnActorCritic(ActorCriticPolicy):
         may_address = obs["may_address"].bool().flatten(0, -2)
         output = self.network(node, parent, may_address)
         if self._training.shares_trunk:
-            values = output[:, :, -1]  # the last number of each node
-            output = output[:, :, :-1]
+            # The value is the last number of each node.
+            output, value = output.split([self._shape.num_outputs, 1], dim=2)
         else:
-            values = self.value_network(node, parent, is_valued)[:, :, 0]
+            value = self.value_network(node, parent, is_valued)
+        values = value.squeeze(2)
         logits = recipient_logits(
             output,
             owner=owner,

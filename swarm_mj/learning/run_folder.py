@@ -126,7 +126,10 @@ def read_curve(path: Path) -> list[Row]:
     try:
         curve: list[Row] = []
         for _, cells in rows:
-            row = {name: float(cell) for name, cell in cells.items() if cell}
+            row: Row = {}
+            for name, cell in cells.items():
+                if cell:
+                    row[name] = float(cell)
             if not (row["decisions"] >= 0 and row["aoi"] >= 0):
                 raise ValueError("a cell is negative, or no number")
             curve.append(row)
@@ -164,7 +167,8 @@ def check_begun(folder: Path) -> None:
 def training_needs(training: Training, limits: Limits) -> needs.Needs:
     """Estimate a run: a rollout and the passes over it, held-out missions, checkpoints, replays."""
     first = replace(training.mission, num_robots=training.robots[0])  # of the replays
-    size, rollout = max(training.robots), rollout_bytes(training)
+    size = max(training.robots)
+    rollout = rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS
     num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
     held_out = learned_memory(size, num_flown)
@@ -193,7 +197,9 @@ def rollout_bytes(training: Training) -> int:
 
 def passes_bytes(training: Training) -> float:
     """Return the size of the activations that a minibatch keeps for its gradient."""
-    nodes, ppo, shape = max(training.robots), training.ppo, training.network
+    nodes = max(training.robots)
+    ppo = training.ppo
+    shape = training.network
     rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches
     kept = KEPT_ROWS if training.drops_silence else 1.0
     directions = 2 if shape.edges == "both" else 1

@@ -105,7 +105,7 @@ def packet_gains(sent: Float32[np.ndarray, "N N"], links: Links) -> Float[np.nda
     for i in range(num_robots):
         for j in range(num_robots):
             if links.received_mw[i, j] > 0.0:
-                gains[i, j] = _gain(sent[i], sent[j])
+                gains[i, j] = _total_rise(sent[i], sent[j])
     return gains
 
 
@@ -136,13 +136,30 @@ def window_gains(
     probability = np.zeros(num_robots)
     for i in range(num_robots):
         if is_free[i]:
-            listen(links, air, i, is_silent, heard, probability)
+            listen(
+                links=links,
+                air=air,
+                also=i,
+                listens=is_silent,
+                heard=heard,
+                probability=probability,
+            )
             gain = 0.0
             for j in range(num_robots):
                 gain += probability[j] * gains[heard[j], j]
             merge_expected(sent, heard, probability, after)
             observe_own(after, now + SLOTS_PER_WINDOW)
-            _add_responses(links, i, recipient, is_free, heard, probability, after, gain, value[i])
+            _add_responses(
+                links=links,
+                i=i,
+                recipient=recipient,
+                is_free=is_free,
+                heard=heard,
+                probability=probability,
+                after=after,
+                gain=gain,
+                value=value[i],
+            )
     return value
 
 
@@ -184,21 +201,28 @@ def _add_responses(
         decodes = heard[r] == i
         if r != i and is_free[r] and (decodes or not has_broadcast):
             has_broadcast |= not decodes
-            also = r if decodes else NOBODY
-            listen(links, air, also, listens, answerer, answer_probability)
+            listen(
+                links=links,
+                air=air,
+                also=r if decodes else NOBODY,
+                listens=listens,
+                heard=answerer,
+                probability=answer_probability,
+            )
             total = gain
             for j in range(num_robots):
                 if answer_probability[j] > 0.0:
                     # A response is only sent if the request was decoded.
                     is_sent = probability[answerer[j]]
-                    total += answer_probability[j] * is_sent * _gain(after[answerer[j]], after[j])
+                    risen = _total_rise(after[answerer[j]], after[j])
+                    total += answer_probability[j] * is_sent * risen
             value[r] = total
 
 
 # Adding in any order lets the compiler use its vectors. Whole slots add up exactly; expected ones
 # to rounding.
 @compiled(fastmath={"reassoc", "nnan", "nsz"})
-def _gain(newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"]) -> float:
+def _total_rise(newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"]) -> float:
     """Return the rise of T from one row to another, summed over subjects."""
     total = np.float32(0.0)
     for k in range(older.shape[0]):

@@ -6,7 +6,6 @@
 import hashlib
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -99,10 +98,16 @@ class MlpPolicy(LearnedPolicy):
     """Perceptrons on the features of all teammates in one row; they fit one team size alone."""
 
     def __init__(
-        self, shape: MlpShape, weights: Weights, extractor: FeatureExtractor, **options: Any
+        self,
+        shape: MlpShape,
+        weights: Weights,
+        extractor: FeatureExtractor,
+        *,
+        is_deterministic: bool = False,
+        own_features: str = "",
     ) -> None:
         """Take weights of that shape, and what makes the features that they were trained on."""
-        super().__init__(extractor, **options)
+        super().__init__(extractor, is_deterministic=is_deterministic, own_features=own_features)
         self._shape = shape
         self._weights = weights
         self.uses = f"{extractor.uses}, by a trained network"

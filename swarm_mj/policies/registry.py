@@ -12,7 +12,7 @@ import sys
 from collections.abc import Iterable, Iterator, Sequence
 from importlib import import_module
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import TypeGuard
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.about import About, Listed, VariantOf
@@ -20,6 +20,7 @@ from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
@@ -144,6 +145,16 @@ def make_policy(
         >>> make_policy("aloha", paper("flocking"), 0.3).parameters
         {'probability': 0.3}
     """
+    arguments = PolicyArguments(
+        probability=probability,
+        is_deterministic=is_deterministic,
+        features=features,
+    )
+    return make_policy_with(arguments, name, mission)
+
+
+def make_policy_with(arguments: PolicyArguments, name: str, mission: Mission) -> Policy:
+    """Return what `make_policy` does, of arguments that are passed on whole."""
     check_kind("policy", name, str, '"planner"')
     check_kind("mission", mission, Mission, 'paper("flocking")')
     name = flown_name(name, mission)
@@ -153,13 +164,14 @@ def make_policy(
             f"a learned policy, or module:Name of your own, not {name!r}"
             f"{did_you_mean(name, POLICIES)}"
         )
+    probability = arguments.probability
     if probability is not None and name not in HAVE_PROBABILITY:
         per_value = "name one policy per value in its file, as `p01 = functools.partial(Mine, 0.1)`"
         hint = f", and {per_value}" if is_own_policy(name) else ""
         raise ValueError(f"{name} takes no transmission probability; leave out {probability}{hint}")
     if is_learned(name):
-        return _learned(name, mission, is_deterministic=is_deterministic, features=features)
-    if is_deterministic:
+        return _learned(arguments, name, mission)
+    if arguments.is_deterministic:
         raise ValueError(
             f"--deterministic applies to learned policies only, not to {name}; leave it out"
         )
@@ -173,15 +185,19 @@ def make_policy(
     return kind.with_probability(mission, probability)
 
 
-def _learned(name: str, mission: Mission, **options: Any) -> Policy:
+def _learned(arguments: PolicyArguments, name: str, mission: Mission) -> Policy:
     # The core of the package flies without these libraries, and torch is slow to import.
     need("torch" if name == SHIPPED else "safetensors", f"policy {name}", "fly another")
     from swarm_mj.policies.stored import load_policy
 
-    if name != SHIPPED:
-        return load_policy(Path(name), mission, **options)
-    policy = load_policy(asset(f"policies/{SHIPPED}{SUFFIX}"), mission, **options)
-    policy.about = SHIPPED_GNN
+    policy = load_policy(
+        asset(f"policies/{SHIPPED}{SUFFIX}") if name == SHIPPED else Path(name),
+        mission,
+        is_deterministic=arguments.is_deterministic,
+        features=arguments.features,
+    )
+    if name == SHIPPED:
+        policy.about = SHIPPED_GNN
     return policy
 
 

@@ -145,21 +145,23 @@ class SpatialTdma(Tdma):
         knows_all = np.all(buffers.is_known | is_oneself, axis=2)
         is_sending = knows_all.copy()
         keep_joined(
-            buffers.position_m,
-            self._order,
-            slot_of(views.now),
-            self._range_m,
-            self._threshold,
-            is_sending,
-            self._powers,
+            believed_m=buffers.position_m,
+            order=self._order,
+            turn=slot_of(views.now),
+            range_m=self._range_m,
+            threshold=self._threshold,
+            is_sending=is_sending,
+            powers=self._powers,
         )
         if self._contends:
             heard = views.phases[-1].heard if views.phases else views.silence
+            priority_draw, rarity_draw = self._draws.next().swapaxes(0, 1)
             wins = winners(
                 timestamp=buffers.timestamp,
                 believed_m=buffers.position_m,
                 heard=heard,
-                draw=self._draws.next(),
+                priority_draw=priority_draw,
+                rarity_draw=rarity_draw,
                 range_m=self._range_m,
                 num_expected=self._num_expected,
                 noted_at=self._noted_at,
@@ -186,7 +188,8 @@ def winners(
     timestamp: Float[np.ndarray, "B N N"],
     believed_m: Float[np.ndarray, "B N N 2"],
     heard: Int[np.ndarray, "B N"],
-    draw: Float[np.ndarray, "B 2 N"],
+    priority_draw: Float[np.ndarray, "B N"],
+    rarity_draw: Float[np.ndarray, "B N"],
     range_m: float,
     num_expected: float,
     noted_at: Float32[np.ndarray, "B N N"],
@@ -201,8 +204,8 @@ def winners(
         timestamp: T as each robot knows it [windows].
         believed_m: Where each robot believes all to be [m].
         heard: Whom each decoded in the last slot; itself: nobody.
-        draw: u of each robot, then one that decides how rarely it wins; both common to all, from
-            0 to 1.
+        priority_draw: u of each robot, from 0 to 1; common to all.
+        rarity_draw: Of each robot, likewise; it decides how rarely the robot wins.
         range_m: The distance at which a lone packet just decodes [m].
         num_expected: How many robots are expected in reach of each, itself too.
         noted_at: T when news was last brought up to date; it becomes the present T [windows].
@@ -227,7 +230,7 @@ def winners(
                 if k != sender and (k == i or from_sender_m2 <= range_m**2):
                     news[b, i, k] += learned
                 # The weight w is the cube of the news, so that who has much of it mostly wins.
-                priority[k] = math.log(draw[b, 0, k]) / (news[b, i, k] + SLOT_WINDOWS) ** 3
+                priority[k] = math.log(priority_draw[b, k]) / (news[b, i, k] + SLOT_WINDOWS) ** 3
                 # Who was silent for a round of turns has failed, or is elsewhere.
                 is_heard = timestamp[b, i, k] > NEVER and silence < len(priority) * SLOT_WINDOWS
                 is_known = k != i and is_heard
@@ -235,6 +238,6 @@ def winners(
                 if is_known and apart_m2 <= (CONTENTION_RANGES * range_m) ** 2:
                     num_near += 1
                     best = max(best, priority[k])
-            wins[b, i] = priority[i] > best and num_expected * draw[b, 1, i] < num_near
+            wins[b, i] = priority[i] > best and num_expected * rarity_draw[b, i] < num_near
             noted_at[b, i] = timestamp[b, i]
     return wins

@@ -7,6 +7,7 @@ import pytest
 
 from swarm_mj.api import flight
 from swarm_mj.mission import paper
+from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.memory import FLYING
 from swarm_mj.simulation.swarm import Swarm
@@ -17,7 +18,12 @@ def test_the_commands_engine_flies_what_it_is_told_and_says_so():
     mission = paper("random-walk", num_robots=4, num_windows=6)
     policy = make_policy("mst", mission, 0.25)
     told = flight.Flight(
-        mission=mission, policy=policy, policy_name="mst", seed=3, probability=0.25, observer=2
+        mission=mission,
+        policy=policy,
+        policy_name="mst",
+        arguments=PolicyArguments(probability=0.25),
+        seed=3,
+        observer=2,
     )
     flown = flight.fly_mission(told, console=quiet_console(), way_on=None)
     assert (flown.code, flown.ending) == (0, "")
@@ -31,7 +37,9 @@ def test_a_small_mission_is_flown_ahead_also_for_a_policy_of_one_s_own(monkeypat
     flown = []
     monkeypatch.setattr(flight, "summarise", lambda windows: flown.append(len(list(windows))))
     for own in ("nowhere:Mine", "Silent"):
-        flight.compile_ahead(paper("stationary", num_windows=4), own, probability=0.2)
+        flight.compile_ahead(
+            paper("stationary", num_windows=4), own, PolicyArguments(probability=0.2)
+        )
     assert flown == [flight.COMPILING_WINDOWS] * 2
 
 

@@ -135,8 +135,8 @@ def test_compiling_is_not_timed(monkeypatch):
     """By a clock that moves when the small mission is flown ahead, and at no other time."""
     now_s, flown = [0.0], []
 
-    def compile_slowly(mission, name, *_, **how):
-        flown.append((mission.task, name, how["probability"]))
+    def compile_slowly(mission, name, arguments):
+        flown.append((mission.task, name, arguments.probability))
         now_s[0] += 20.0
 
     monkeypatch.setattr(flight, "time", SimpleNamespace(perf_counter=lambda: now_s[0]))

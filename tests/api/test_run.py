@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import swarm_mj
-from swarm_mj.api.run import Metrics
+from swarm_mj.api.flight_summary import Metrics
 from swarm_mj.replay import view
 from swarm_mj.replay.read import windows
 from swarm_mj.replay.view import VideoStyle

@@ -1,6 +1,7 @@
 """What the benchmark prints, and what it refuses."""
 
 import json
+import mmap
 
 import pytest
 
@@ -59,15 +60,18 @@ def test_bench_shows_learning_and_leaves_the_evaluation_out(quick, capsys):
     assert learned["rows"] == [{"name": "train --credit team", "values": [12.34], "unit": "/ s"}]
 
 
-@pytest.mark.parametrize(("flag", "name"), [("--json", "b.json"), ("--plot", "b.svg")])
-def test_an_existing_file_needs_force(quick, capsys, flag, name):
-    (quick / name).write_text("precious")
-    teams = ["--robots", "3", "4"] if flag == "--plot" else []
-    assert main([*QUICK, *teams, flag, name]) == 2
+@pytest.mark.usefixtures("quick")
+@pytest.mark.parametrize(
+    ("flag", "name", "robots"),
+    [("--json", "b.json", ()), ("--plot", "b.svg", ("--robots", "100", "200"))],
+)
+def test_an_existing_file_needs_force(teams, capsys, flag, name, robots):
+    (teams / name).write_text("precious")
+    assert main([*QUICK, *robots, flag, name]) == 2
     assert f"{flag} {name} exists; name another, or replace it with" in capsys.readouterr().err
-    assert (quick / name).read_text() == "precious"
-    assert main([*QUICK, *teams, flag, name, "--force"]) == 0
-    assert (quick / name).read_text() != "precious"
+    assert (teams / name).read_text() == "precious"
+    assert main([*QUICK, *robots, flag, name, "--force"]) == 0
+    assert (teams / name).read_text() != "precious"
 
 
 @pytest.mark.usefixtures("quick")
@@ -112,6 +116,14 @@ def teams(monkeypatch, here):
 
     monkeypatch.setattr(bench_simulation, "team_rows", rows)
     return here
+
+
+def test_a_team_takes_a_page_of_memory_though_the_peak_stays(monkeypatch, capsys):
+    monkeypatch.setattr(bench_simulation, "peak_memory", lambda: 300_000_000)
+    bench_simulation.measure(num_robots=3, seconds=0.01)
+    measured = json.loads(capsys.readouterr().out)
+    assert measured["process, MB"] == 300.0
+    assert measured["team, MB"] == mmap.PAGESIZE / 1e6
 
 
 def test_teams_of_several_sizes_show_their_growth(teams, capsys):

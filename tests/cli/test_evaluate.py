@@ -8,7 +8,8 @@ import pytest
 from forks import files
 
 from swarm_mj.cli import parse
-from swarm_mj.evaluation.results import COLUMNS, read_results
+from swarm_mj.evaluation.results import COLUMNS
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.simulation.rollout import rollout, summarise

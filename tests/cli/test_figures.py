@@ -8,7 +8,7 @@ from xml.etree import ElementTree
 import pytest
 from PIL import Image
 
-from swarm_mj.evaluation.results import write_results
+from swarm_mj.evaluation.results_files import write_results
 
 SYNTHETIC = runpy.run_path(
     str(Path(__file__).parent.parent / "evaluation" / "figures" / "synthetic.py")

@@ -8,7 +8,7 @@ from tiny_policies import save_tiny
 from swarm_mj.cli import main
 from swarm_mj.evaluation.batch import fly_batch
 from swarm_mj.evaluation.flying import progress_path, start_progress
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
 from swarm_mj.replay.read import windows

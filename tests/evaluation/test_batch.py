@@ -17,6 +17,7 @@ from swarm_mj.evaluation.batch import (
 )
 from swarm_mj.mission import paper
 from swarm_mj.mission.placement import largest_part
+from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.radio.mission_radio import radio_of
@@ -32,7 +33,8 @@ def small(task="random-walk", **overrides):
 
 
 def batch(mission, policy="mst", seeds=SEEDS, probability=0.3):
-    return Batch(policy=policy, how={"probability": probability}, mission=mission, seeds=seeds)
+    arguments = PolicyArguments(probability=probability)
+    return Batch(policy=policy, arguments=arguments, mission=mission, seeds=seeds)
 
 
 def active(swarm):

@@ -14,7 +14,8 @@ from tiny_policies import save_tiny
 import swarm_mj
 from swarm_mj.cli import main, script
 from swarm_mj.evaluation.missions_table import read_missions, write_missions
-from swarm_mj.evaluation.results import COLUMNS, read_results, write_results
+from swarm_mj.evaluation.results import COLUMNS
+from swarm_mj.evaluation.results_files import read_results, write_results
 from swarm_mj.learning.run_folder import read_curve
 from swarm_mj.mission import paper
 from swarm_mj.policies.stored import read_policy

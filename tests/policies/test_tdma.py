@@ -190,8 +190,18 @@ def contend(believed_m, timestamp, draw, noted_at=None, news=None, heard=None, n
     news = news.astype(np.float32)[None]
     heard = np.arange(num_robots) if heard is None else heard
     noted_at = noted_at.astype(np.float32)[None]
-    args = believed_m[None], heard[None], draw[None], 250.0, num_expected, noted_at, news
-    return winners(timestamp[None], *args)[0], news[0]
+    wins = winners(
+        timestamp=timestamp[None],
+        believed_m=believed_m[None],
+        heard=heard[None],
+        priority_draw=draw[None, 0],
+        rarity_draw=draw[None, 1],
+        range_m=250.0,
+        num_expected=num_expected,
+        noted_at=noted_at,
+        news=news,
+    )
+    return wins[0], news[0]
 
 
 def test_news_by_hand():

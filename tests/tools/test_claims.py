@@ -8,7 +8,7 @@ import claims
 import pytest
 from synthetic import result
 
-from swarm_mj.evaluation.results import write_results
+from swarm_mj.evaluation.results_files import write_results
 
 
 @pytest.fixture

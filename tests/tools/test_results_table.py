@@ -5,7 +5,7 @@ import results_table as tool
 from results_table import table, value
 from synthetic import result, sweep
 
-from swarm_mj.evaluation.results import write_results
+from swarm_mj.evaluation.results_files import write_results
 from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED
 
 ORIGIN = (

@@ -11,7 +11,7 @@ from PIL import Image
 from swarm_mj.evaluation.figures.curves import method_of, results_of
 from swarm_mj.evaluation.figures.drawing import caption
 from swarm_mj.evaluation.published import FLOCK, RESULT_FIGURES
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results_files import read_results
 
 ROOT = Path(__file__).parent.parent.parent
 DESCRIPTION = "{http://purl.org/dc/elements/1.1/}description"

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from synthetic import result
 
-from swarm_mj.evaluation.results import write_results
+from swarm_mj.evaluation.results_files import write_results
 
 MISSIONS = {  # by the impairments' names
     "none": {},

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from synthetic import sweep
 
-from swarm_mj.evaluation.results import read_results, write_results
+from swarm_mj.evaluation.results_files import read_results, write_results
 
 
 def walks(policy, ages):

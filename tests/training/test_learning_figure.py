@@ -7,7 +7,7 @@ import learning_figure as program
 import pytest
 from synthetic import result
 
-from swarm_mj.evaluation.results import write_results
+from swarm_mj.evaluation.results_files import write_results
 from swarm_mj.learning.run_folder import read_curve
 
 ROOT = Path(__file__).parents[2]

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import result
 
-from swarm_mj.evaluation.results import write_results
+from swarm_mj.evaluation.results_files import write_results
 from training.limits_figure import draw_limits, exact_table, read_floor, table
 
 HEADER = "range_ratio,floor_windows,commit\n"

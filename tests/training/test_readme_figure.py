@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import readme_figure as program
 
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results_files import read_results
 
 ROOT = Path(__file__).parent.parent.parent
 RESULTS = ROOT / "training" / "results" / "paper-random-walk.csv"

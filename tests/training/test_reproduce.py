@@ -13,7 +13,7 @@ from synthetic import result
 
 from swarm_mj.cli import parse
 from swarm_mj.evaluation.published import RESULT_FIGURES
-from swarm_mj.evaluation.results import read_results, write_results
+from swarm_mj.evaluation.results_files import read_results, write_results
 from swarm_mj.system.packages import commit
 
 ROOT = Path(__file__).parents[2]

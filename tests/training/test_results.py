@@ -8,7 +8,7 @@ import pytest
 import results as program
 from results_table import TABLES
 
-from swarm_mj.evaluation.results import read_results
+from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.system.exit_codes import DONE, INTERRUPTED
 from swarm_mj.system.packages import commit
 

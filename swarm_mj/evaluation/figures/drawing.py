@@ -119,8 +119,11 @@ def caption(figure: ResultFigure, results: Sequence[Result]) -> str:
         f"{figure.name}, preset {result.preset}: {result.episodes} missions, seeds {result.seed} "
         f"to {last}, {result.num_windows} windows each; {made_by}"
     ]
-    budgets = [config_of(each).get("decisions") for each in results]
-    decisions = [budget for budget in budgets if budget]
+    decisions: list[int] = []
+    for each in results:
+        budget = config_of(each).get("decisions")
+        if budget:
+            decisions.append(budget)
     if decisions:  # some were trained
         least = f"{min(decisions):,}"
         most = f"{max(decisions):,}"

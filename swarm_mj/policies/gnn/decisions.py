@@ -50,9 +50,10 @@ def recipient_logits(
     Recipients that it may not address have `IMPOSSIBLE`; the owner always may.
     """
     own = owner[:, None]
-    logits = output[:, :, 0]
-    if output.shape[2] > 1:  # the authors' second number: of sending at no power, hence of silence
-        zero_power = output[:, :, 1].masked_fill(~may_address, IMPOSSIBLE)
+    logits, *others = output.unbind(dim=2)
+    if others:  # the authors' second number: of sending at no power, hence of silence
+        (zero_power,) = others
+        zero_power = zero_power.masked_fill(~may_address, IMPOSSIBLE)
         unsent = torch.cat([zero_power, logits.gather(1, own)], dim=1)
         logits = logits.scatter(1, own, torch.logsumexp(unsent, dim=1, keepdim=True))
     if silence_logit:

@@ -60,6 +60,7 @@ IS_LOCAL = tuple(not feature.needs_turns for feature in features_of(ExtendedNode
 Places = Float[np.ndarray, "B N N 2"]
 Flags = Bool[np.ndarray, "B N N"]
 Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE`
+OwnNodes = Shaped[np.ndarray, "N"]  # those of one robot's graph
 Timestamps = Float32[np.ndarray, "N"]
 Column = Float[np.ndarray, "N"]
 
@@ -88,7 +89,7 @@ class ExtendedFeatures(FeatureExtractor):
         may_address = np.empty(node.shape, dtype=np.bool_)
         is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
         window = views.now.astype(np.int64)
-        _write_ages_and_news(
+        _write_ages(
             memory=self._memory,
             last_attempt=buffers.last_attempt,
             is_observed=buffers.is_known,
@@ -98,6 +99,7 @@ class ExtendedFeatures(FeatureExtractor):
             node=node,
             may_address=may_address,
         )
+        _write_news(self._memory, node)  # by who is near, which is written by now
         _write_beliefs(
             believed_m=buffers.position_m,
             is_known=is_known,
@@ -105,15 +107,31 @@ class ExtendedFeatures(FeatureExtractor):
             range_m=range_m,
             node=node,
         )
-        has_joined = node["has_joined"]  # a view, which is written in place
-        threshold = from_db(self._mission.sinr_threshold_db)
-        write_joined(buffers.position_m, is_known, window, range_m, threshold, has_joined)
+        has_joined = node["has_joined"]  # a view
+        self._write_joined(buffers.position_m, is_known, window, has_joined)
         rows = (len(window) * num_robots, num_robots)
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(ExtendedFeatures.names)),
             parent=buffers.parent.reshape(rows),
             may_address=may_address.reshape(rows),
             has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,
+        )
+
+    def _write_joined(
+        self,
+        believed_m: Places,
+        is_known: Flags,
+        window: Int[np.ndarray, "B"],
+        has_joined: Float32[np.ndarray, "B N N"],
+    ) -> None:
+        """Write who has a turn by interference, as each robot believes."""
+        write_joined(
+            believed_m=believed_m,
+            is_known=is_known,
+            turn=window,
+            range_m=self._mission.range_m,
+            threshold=from_db(self._mission.sinr_threshold_db),
+            has_joined=has_joined,
         )
 
 
@@ -131,7 +149,7 @@ class LocalFeatures(ExtendedFeatures):
 
 
 @compiled()
-def _write_ages_and_news(
+def _write_ages(
     memory: Memory,
     last_attempt: Float[np.ndarray, "B N N"],
     is_observed: Flags,
@@ -141,17 +159,11 @@ def _write_ages_and_news(
     node: Nodes,
     may_address: Flags,
 ) -> None:
-    """Write all but what follows from positions and the clock alone.
-
-    A robot's own news is to all robots in range together.
-    """
+    """Write all but news, and what follows from positions and the clock alone."""
     num_missions, num_robots = node.shape[:2]
     for b in range(num_missions):
         rank = (np.arange(num_robots) - int(now[b])) % num_robots / num_robots
         for i in range(num_robots):
-            own = memory.timestamp[b, i]
-            said = memory.said[b, i]
-            news = unsaid_news = 0.0
             num_known = np.sum(is_observed[b, i]) + (not is_observed[b, i, i])
             known_share = num_known / num_robots
             for k in range(num_robots):
@@ -162,7 +174,9 @@ def _write_ages_and_news(
                 may_address[b, i, k] = not is_known or ranges <= ADDRESS_RANGES
                 of_k.is_oneself = k == i
                 of_k.is_known = is_known
-                of_k.timestamp_age = log_age(now[b], own[k], is_observed[b, i, k])
+                of_k.timestamp_age = log_age(
+                    now[b], memory.timestamp[b, i, k], is_observed[b, i, k]
+                )
                 of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
                 of_k.is_near = is_known and k != i and ranges <= 1.0
                 of_k.heard_age = log_age(now[b], memory.heard[b, i, k])
@@ -171,6 +185,23 @@ def _write_ages_and_news(
                 of_k.turn_rank = rank[k]
                 of_k.known_share = known_share
                 of_k.team_size = num_robots / TEAM
+            # Of oneself at the end: a choice in the loop would double the time that it takes.
+            of_itself: ExtendedNode = node[b, i, i]
+            of_itself.heard_age = log_age(now[b], memory.sent[b, i])
+
+
+@compiled()
+def _write_news(memory: Memory, node: Nodes) -> None:
+    """Write what a robot's packet would tell its neighbours; its own news is to all of them."""
+    num_missions, num_robots = node.shape[:2]
+    for b in range(num_missions):
+        for i in range(num_robots):
+            own = memory.timestamp[b, i]
+            said = memory.said[b, i]
+            news = 0.0
+            unsaid_news = 0.0
+            for k in range(num_robots):
+                of_k: ExtendedNode = node[b, i, k]
                 # Who is out of range cannot be reached, so there is no news to it.
                 of_k.news = 0.0
                 of_k.unsaid_news = 0.0
@@ -181,9 +212,7 @@ def _write_ages_and_news(
                     unsaid_news += of_k.unsaid_news
                     of_k.news = logarithm(of_k.news)
                     of_k.unsaid_news = logarithm(of_k.unsaid_news)
-            # Of oneself at the end: a choice in the loop would double the time that it takes.
             of_itself: ExtendedNode = node[b, i, i]
-            of_itself.heard_age = log_age(now[b], memory.sent[b, i])
             of_itself.news = logarithm(news)
             of_itself.unsaid_news = logarithm(unsaid_news)
 
@@ -221,14 +250,7 @@ def _write_beliefs(
             its = node[b, i]
             # Of a team at rest most robots believe the same: no need to count all of it again.
             if believes_as_the_last(believed_m[b], is_known[b], i):
-                last = node[b, i - 1]
-                for k in range(num_robots):
-                    of_k: ExtendedNode = its[k]
-                    same: ExtendedNode = last[k]
-                    of_k.neighbours = same.neighbours
-                    of_k.has_turn_1_5 = same.has_turn_1_5
-                    of_k.has_turn_2 = same.has_turn_2
-                    of_k.has_turn_3 = same.has_turn_3
+                _copy_beliefs(its, node[b, i - 1])
                 continue
             num_known = 0
             for k in range(num_robots):
@@ -245,10 +267,67 @@ def _write_beliefs(
                         known_x_m[:num_known], known_y_m[:num_known], x_m[k], y_m[k], range_m
                     )
                     of_each.neighbours = (num_near - 1) / CROWD  # for it finds itself
-            whom = is_known[b, i]
-            write_turns(x_m, y_m, whom, window[b], 1.5 * range_m, its["has_turn_1_5"], is_close)
-            write_turns(x_m, y_m, whom, window[b], 2.0 * range_m, its["has_turn_2"], is_close)
-            write_turns(x_m, y_m, whom, window[b], 3.0 * range_m, its["has_turn_3"], is_close)
+            _write_turns_by_radius(
+                x_m=x_m,
+                y_m=y_m,
+                is_known=is_known[b, i],
+                window=window[b],
+                range_m=range_m,
+                its=its,
+                is_close=is_close,
+            )
+
+
+@compiled()
+def _copy_beliefs(its: OwnNodes, last: OwnNodes) -> None:
+    """Write a robot's neighbours and turns, which are those of the robot before it."""
+    for k in range(its.shape[0]):
+        of_k: ExtendedNode = its[k]
+        same: ExtendedNode = last[k]
+        of_k.neighbours = same.neighbours
+        of_k.has_turn_1_5 = same.has_turn_1_5
+        of_k.has_turn_2 = same.has_turn_2
+        of_k.has_turn_3 = same.has_turn_3
+
+
+@compiled()
+def _write_turns_by_radius(
+    x_m: Column,
+    y_m: Column,
+    is_known: Bool[np.ndarray, "N"],
+    window: int,
+    range_m: float,
+    its: OwnNodes,
+    is_close: Column,
+) -> None:
+    """Write one robot's turns at the three radii, as `write_turns` does."""
+    write_turns(
+        x_m=x_m,
+        y_m=y_m,
+        is_known=is_known,
+        window=window,
+        radius_m=1.5 * range_m,
+        has_turn=its["has_turn_1_5"],
+        is_close=is_close,
+    )
+    write_turns(
+        x_m=x_m,
+        y_m=y_m,
+        is_known=is_known,
+        window=window,
+        radius_m=2.0 * range_m,
+        has_turn=its["has_turn_2"],
+        is_close=is_close,
+    )
+    write_turns(
+        x_m=x_m,
+        y_m=y_m,
+        is_known=is_known,
+        window=window,
+        radius_m=3.0 * range_m,
+        has_turn=its["has_turn_3"],
+        is_close=is_close,
+    )
 
 
 @compiled()

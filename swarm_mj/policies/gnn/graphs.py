@@ -90,7 +90,8 @@ class FeatureExtractor(ABC):
 
 def check_width(features: str, extractor: FeatureExtractor, graphs: Graphs) -> None:
     """Raise ValueError unless an extractor names all numbers of its nodes; a user's own may not."""
-    named, found = len(extractor.names), graphs.node.shape[-1]
+    named = len(extractor.names)
+    found = graphs.node.shape[-1]
     if named != found:
         raise ValueError(f"{features} names {named} features, but its node has {found}")
 

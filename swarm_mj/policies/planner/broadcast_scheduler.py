@@ -279,7 +279,7 @@ def _write_gains(timestamp: Float32[np.ndarray, "N N"], problem: Problem, search
         for j in range(timestamp.shape[0]):
             gain[i, j] = 0.0
             if problem.lone[i, j] > 0.0:
-                gain[i, j] = _gain(timestamp[i], timestamp[j], problem.weight[j])
+                gain[i, j] = _value_of_rise(timestamp[i], timestamp[j], problem.weight[j])
                 if gain[i, j] > 0.0:
                     has_news[i] = True
 
@@ -287,7 +287,7 @@ def _write_gains(timestamp: Float32[np.ndarray, "N N"], problem: Problem, search
 # Adding in any order lets the compiler use its vectors. Whole slots add up exactly; products to
 # rounding, so robots that plan alike need machines alike.
 @compiled(makes_arrays=False, fastmath={"reassoc", "nnan", "nsz"})
-def _gain(
+def _value_of_rise(
     newer: Float32[np.ndarray, "N"],
     older: Float32[np.ndarray, "N"],
     weight: Float32[np.ndarray, "N"],
@@ -299,7 +299,7 @@ def _gain(
     return float(total)
 
 
-# Apart from `_gain`, whose permission to reorder sums would extend to this product.
+# Apart from `_value_of_rise`, whose permission to reorder sums would extend to this product.
 @compiled(makes_arrays=False)
 def _weighed(r: np.floating, weight: np.floating) -> np.floating:
     """Return a squared rise times its weight, multiplied in this order."""

@@ -19,7 +19,8 @@ LONG_AGO = -1_000_000  # before all slots; differences of 32 bits remain exact
 NO_PLACE = -1  # the place of a slot that is left to robots in need
 MAX_MISSED = 100  # that are counted, in 8 bits
 # So that misses are never proof of a collision at once, and so that enough of them are in the end.
-MIN_LOSS, MAX_LOSS = 1e-3, 0.9
+MIN_LOSS = 1e-3
+MAX_LOSS = 0.9
 RECENT_WEIGHT = 0.1  # of the last packet in the share that were decoded
 
 
