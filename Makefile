@@ -11,13 +11,14 @@ SCALE ?= paper
 STUDIES ?=
 BUDGET ?= quick
 
-.PHONY: help setup setup-dev fly bench check same test test-all test-engines attack reference lock audit format results figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check same test test-all test-engines test-installs attack reference lock audit format results figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
 	@echo "make test    set up if needed and run the tests, each law once"
 	@echo "make test-all  run the long tests, too: many seeds, a built wheel, the site"
 	@echo "make test-engines  try studies on a Ray cluster and on SLURM's stand-in; installs 0.3 GB"
+	@echo "make test-installs  try every install line of the docs; minutes, downloads much; ARGS='--only ray'"
 	@echo "make attack  run the fault tests for minutes, and count what held"
 	@echo "make reference  ask the network simulator ns-3 again (Linux on x86-64, with g++)"
 	@echo "make check   formatter, linter and type checker"
@@ -97,6 +98,9 @@ test-engines: $(DEV) .venv/engines/ready
 	  $$(.venv/engines/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/others.pth
 	@.venv/engines/bin/python -m pip install --quiet --disable-pip-version-check ray==2.60.0 submitit==1.5.4
 	@touch $@
+
+test-installs: $(DEV)
+	$(BIN)/python tools/installs.py $(ARGS)
 
 attack: $(DEV)
 	SWARM_MJ_TRIES=20 SWARM_MJ_FAULTS=training/results/attack.csv \

@@ -16,7 +16,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     II-C    Eq. 9   local policy             policies.policy.DecentralisedPolicy
     II-C    Eq. 10  age of information       protocol.costs.age_of_information
     III-B   Alg. 1  the protocol's window    protocol.window.window
-    IV-C            two broadcasts instead   protocol.window.DoubleBroadcast
+    IV-C            two broadcasts instead   protocol.window_protocols.DoubleBroadcast
     III-A           a buffer as a graph      policies.gnn.graphs.Graphs
     III-A   Eq. 11  GN block                 policies.gnn.network.gn_block
     III-A   Eq. 12  mean aggregation         policies.gnn.network.mean_aggregation

@@ -3,7 +3,7 @@
 from dataclasses import fields
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.specification import CHANNEL
+from swarm_mj.mission.labels import CHANNEL
 from swarm_mj.system.fields import about_of
 
 SPECS = {spec.name: spec for spec in fields(Mission)}

@@ -15,8 +15,9 @@ def where_class(kind):
 
 
 def where_field(kind, name):
-    """The line on which a class declares a field."""
-    return where_text(inspect.getfile(kind), rf"^    {name}: ")
+    """The line on which a class, or the base that it has the field from, declares a field."""
+    owner = next(each for each in kind.__mro__ if name in inspect.get_annotations(each))
+    return where_text(inspect.getfile(owner), rf"^    {name}: ")
 
 
 def where_text(file, pattern):

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from turns import settled
 
 from swarm_mj.mission import reference
 from swarm_mj.physics.state import RobotStates
@@ -46,7 +47,7 @@ def replayed(name):
     observe_self(buffers, start, now)
     ages, checkpoints, attempts = [], [], {"silence_is_attempt": mission.silence_is_attempt}
     for w, recipient in enumerate(recording["recipient"].astype(np.int64)):
-        window(buffers, flown[w], recipient[None], channel, now, **attempts)
+        window(buffers, *settled(flown[w], recipient[None]), channel, now, **attempts)
         now = now + 1
         ages.append(age_of_information(buffers, now)[0].item())
         if (w + 1) % EVERY == 0:

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
+from turns import settled
 
 from swarm_mj.control.motion import flocking
 from swarm_mj.mission import paper, reference
@@ -22,7 +23,8 @@ def talked(mission, states, recipients):
     """Buffers, the last window's costs, hops and accelerations after some windows."""
     buffers, channel = empty_buffers(1, NUM_ROBOTS), radio_of(mission)
     for now, recipient in enumerate(recipients):
-        phases = window(buffers, states, recipient[None], channel, np.array([float(now)]))
+        turn = settled(states, recipient[None])
+        phases = window(buffers, *turn, channel, np.array([float(now)]))
     costs = window_costs(
         buffers, states, phases, np.array([float(len(recipients))]), is_broadcast=False
     )

@@ -92,7 +92,7 @@ FOR_THE_TYPE_CHECKER = [
     ),
     Mistake(
         name="an arena whose material has no loss",
-        file="swarm_mj/physics/arenas.py",
+        file="swarm_mj/physics/materials.py",
         before='TREE = Material(\n    name="tree",\n    loss_db=6.0,',
         after='TREE = Material(\n    name="tree",',
         said='Argument missing for parameter "loss_db"',
@@ -127,7 +127,7 @@ FOR_THE_TYPE_CHECKER = [
     ),
     Mistake(
         name="a task without its controller",
-        file="swarm_mj/mission/specification.py",
+        file="swarm_mj/mission/team.py",
         before='Task = Literal["stationary", "random-walk", "flocking"]',
         after='Task = Literal["stationary", "random-walk", "flocking", "patrol"]',
         said="patrol",
@@ -136,7 +136,7 @@ FOR_THE_TYPE_CHECKER = [
     ),
     Mistake(
         name="a mission field whose help stands under a misspelt label",
-        file="swarm_mj/mission/specification.py",
+        file="swarm_mj/mission/impairments.py",
         before='        "largest drift of a clock",',
         after='        hepl="largest drift of a clock",',
         said='No parameter named "hepl"',
@@ -184,12 +184,11 @@ AGE = '    timestamp_age: Annotated[float, Feature("age of T")]\n'
 FOR_TESTS = [
     Mistake(
         name="a mission field that type checkers are not told of",
-        file="swarm_mj/mission/specification.py",
+        file="swarm_mj/mission/impairments.py",
         before="    erasure: float\n",
         after="",
         caught_by=(
-            "tests/mission/test_specification.py"
-            "::test_type_checkers_are_told_of_every_field_by_its_type"
+            "tests/mission/test_keywords.py::test_type_checkers_are_told_of_every_field_by_its_type"
         ),
         said="MissionFields lacks the line `erasure: ",
     ),
@@ -225,19 +224,19 @@ FOR_TESTS = [
     ),
     Mistake(
         name="a mission field that no radio reads",
-        file="swarm_mj/mission/specification.py",
+        file="swarm_mj/mission/impairments.py",
         before=ERASURE,
         after=JITTER + ERASURE,
         caught_by=f"{EFFECTS}::test_every_number_of_the_channel_is_read_once",
-        said=r"swarm_mj/mission/specification\.py:{line}: jitter_db is read by no effect",
+        said=r"swarm_mj/mission/impairments\.py:{line}: jitter_db is read by no effect",
     ),
     Mistake(
         name="an effect that is left out of the list",
         file="swarm_mj/radio/effects.py",
-        before="tuple(MissionEffect.__subclasses__())",
-        after="(PathLoss, Shadowing, Fading, Bursts, HighPower, Clocks)",
+        before="    Erasure,\n",
+        after="",
         caught_by=f"{EFFECTS}::test_every_number_of_the_channel_is_read_once",
-        said=r"swarm_mj/mission/specification\.py:\d+: erasure is read by no effect",
+        said=r"swarm_mj/mission/impairments\.py:\d+: erasure is read by no effect",
     ),
     Mistake(
         name="an effect that does nothing",

@@ -25,7 +25,8 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import CentralisedPolicy
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, observe_own
-from swarm_mj.protocol.window import DoubleBroadcast, LocalViews
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.protocol.window_protocols import DoubleBroadcast
 from swarm_mj.radio.links import Links, air_of
 from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.radio.reception import decoded, incoming_at

@@ -34,7 +34,8 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, Parameters, Policy
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import DoubleBroadcast, LocalViews
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.protocol.window_protocols import DoubleBroadcast
 from swarm_mj.radio.links import Links, air_of, listen
 from swarm_mj.radio.mission_radio import TrueLinks, radio_of
 from swarm_mj.radio.reception import NOBODY

@@ -21,7 +21,8 @@ from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
-from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK, Recorder, check_observer
+from swarm_mj.replay.recorder import Recorder, check_observer
+from swarm_mj.replay.replay_size import IN_MEMORY, ON_DISK
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.memory import FLYING, LIBRARIES, policy_memory
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
-from swarm_mj.system.fields import did_you_mean
+from swarm_mj.system.arguments import did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)

@@ -17,7 +17,8 @@ from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.components import Components
-from swarm_mj.system.fields import check_kind, check_names, former_names
+from swarm_mj.system.arguments import check_kind, check_names
+from swarm_mj.system.fields import former_names
 from swarm_mj.system.needs import check_fits
 from swarm_mj.system.terminal import quiet_console
 

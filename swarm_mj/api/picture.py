@@ -25,7 +25,8 @@ from swarm_mj.api.picture_text import (
     write_text,
 )
 from swarm_mj.evaluation.figures.style import styled
-from swarm_mj.physics import arenas, outlines, scene, state
+from swarm_mj.physics import outlines, scene, state
+from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
 
@@ -126,7 +127,7 @@ def _draw_ground(axes: Axes, footage: Footage) -> list[Line2D]:
     axes.add_patch(border)
     label = "wall of the area" if mission.has_walls else "area"
     shown = [Line2D([], [], linestyle=dashes, linewidth=1.2, color=colour, label=label)]
-    obstacles = arenas.obstacles_of(scene.compose(mission, scene=footage.scene).compile())
+    obstacles = obstacles_of(scene.compose(mission, scene=footage.scene).compile())
     if len(obstacles.kind) > 0:
         for outline_m in outlines.footprints(obstacles, state.ROBOT_HEIGHT_M):
             block = Polygon(outline_m, linewidth=0.8, zorder=1.5)

@@ -16,7 +16,7 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
-from swarm_mj.replay.recorder import Log
+from swarm_mj.replay.log import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
 from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord

@@ -17,7 +17,7 @@ from typing import Any, NoReturn
 # All else is imported by functions that `main` calls, which hears Ctrl-C while modules load.
 from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from swarm_mj.system.interrupt import INTERRUPTS, interruptible, raise_if_interrupted
-from swarm_mj.system.streams import lasting_streams
+from swarm_mj.system.streams import in_a_line, lasting_streams
 
 NAME = "swarm-mj"
 WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, PermissionError)
@@ -103,7 +103,7 @@ def script(
 def _show_or_refuse(arguments: Sequence[str]) -> NoReturn:
     """Print the overview or the version, or refuse a line that names no command."""
     from swarm_mj.cli.options import Parser
-    from swarm_mj.system.fields import did_you_mean
+    from swarm_mj.system.arguments import did_you_mean
     from swarm_mj.system.packages import version
 
     begin_with = {f"{NAME} {command}": meaning for command, meaning in BEGINNING.items()}
@@ -136,7 +136,7 @@ def _exit_code(name: str, work: Callable[[], int]) -> int:
     with lasting_streams() as failure, interruptible() as was_interrupted:
         code, error = _outcome(work, was_interrupted)
         if error:
-            sys.stderr.write(f"{name}: {error}\n")
+            sys.stderr.write(f"{name}: {in_a_line(error)}\n")
         if lost := failure():
             sys.stderr.write(f"{name}: error: not all output was written: {lost.strerror}\n")
         return code or (FAILED if lost else DONE)

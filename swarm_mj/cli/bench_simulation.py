@@ -231,7 +231,11 @@ def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], obj
 
     def talk() -> None:
         swarm.talk.window(
-            swarm.buffers, swarm.states, recipient, now=swarm.now, silence_is_attempt=False
+            swarm.buffers,
+            lambda _: recipient,
+            lambda: swarm.states,
+            now=swarm.now,
+            silence_is_attempt=False,
         )
         swarm.now = swarm.now + 1.0
 

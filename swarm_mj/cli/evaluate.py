@@ -1,8 +1,8 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
-from contextlib import ExitStack
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from functools import partial
 from itertools import product
@@ -135,7 +135,7 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     costs = _begun(kept, header, is_resumed=options.resume) if kept else {}
     try:
         keep = partial(flying.append_progress, kept, header) if kept else None
-        with memory_errors():
+        with memory_errors(), _kept_if_flown(kept, costs):
             flying.fly_study(study, costs, engine, keep, console)
     except (KeyboardInterrupt, MemoryError) as error:
         if isinstance(error, MemoryError):
@@ -159,6 +159,17 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     if options.plot:
         _write_chart(options.plot, results)
     return DONE
+
+
+@contextmanager
+def _kept_if_flown(kept: Path | None, costs: Mapping[int, BatchCosts]) -> Iterator[None]:
+    """Remove the progress file if an error leaves nothing in it; else `--force` would be needed."""
+    try:
+        yield
+    except Exception as error:
+        if kept and not costs and not isinstance(error, MemoryError):
+            kept.unlink(missing_ok=True)
+        raise
 
 
 def _begun(kept: Path, header: Mapping[str, object], *, is_resumed: bool) -> dict[int, BatchCosts]:

@@ -13,7 +13,8 @@ from swarm_mj.evaluation.published import FIGURES, FLOCK, FORMATS, RESULT_FIGURE
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.policies.registry import files_of
-from swarm_mj.system.fields import GONE_IN, check_choice, files_read, setting, the_file
+from swarm_mj.system.arguments import check_choice
+from swarm_mj.system.fields import GONE_IN, files_read, setting, the_file
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
 

@@ -141,6 +141,8 @@ def _replay_path(options: FlyOptions) -> Path | None:
         raise ValueError("--no-record is not allowed with --record; leave one out")
     if options.no_record and options.view:
         raise ValueError("--view needs a replay; leave out --no-record")
+    if options.no_record and options.observer:
+        raise ValueError("--observer is whose knowledge a replay shows; leave out --no-record")
     is_chosen = options.no_record or options.record or options.view
     if not (is_chosen or is_installed("rerun")):
         plain_console(is_error=True).print(missing("rerun", "no replay is recorded: it"))

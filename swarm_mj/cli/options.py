@@ -17,8 +17,10 @@ from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.cli.option_values import CONVERT
 from swarm_mj.system import fields as settings
+from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import Meaning, about_of
+from swarm_mj.system.streams import check_printable, in_a_line
 
 Value = TypeVar("Value")
 # What was typed, by the places of the options. Each value is of its option's type, which the parser
@@ -61,13 +63,14 @@ class Parser(argparse.ArgumentParser):
             flags: list[str] = []
             for action in self._actions:
                 flags.extend(action.option_strings)
-            hint = settings.did_you_mean(left[0].partition("=")[0], flags)
+            hint = did_you_mean(left[0].partition("=")[0], flags)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
 
     def error(self, message: str) -> NoReturn:
         """Print the complaint and where to read on; exit with 2."""
-        self.exit(BAD_INPUT, f"{self.prog}: error: {message} (see {self.prog} --help)\n")
+        said = in_a_line(message)
+        self.exit(BAD_INPUT, f"{self.prog}: error: {said} (see {self.prog} --help)\n")
 
 
 class _HelpAll(argparse.Action):  # with the options that most people do not need
@@ -172,7 +175,7 @@ def _flag(name: str) -> str:
 
 
 def _check_names(arguments: Sequence[str]) -> None:
-    """Raise ValueError for a name that not all libraries could open, or none could find."""
+    """Raise ValueError for names that not all libraries or terminals take, or none could find."""
     try:
         names = (*arguments, str(Path.cwd()))
     except FileNotFoundError:
@@ -182,6 +185,8 @@ def _check_names(arguments: Sequence[str]) -> None:
         if any("\udc80" <= character <= "\udcff" for character in name):
             encoding = sys.getfilesystemencoding()
             raise ValueError(f"{name!a} has bytes that are no {encoding}; rename it")
+    for argument in arguments:
+        check_printable(argument, "rename it")
 
 
 def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:

@@ -65,7 +65,7 @@ def run(options: PoliciesOptions) -> int:
         if len(names) < len(flown):
             plain_console(is_error=True).print(missing("torch", f"{SHIPPED} is left out: it"))
     with Console(stderr=True).status("Loading ..."):
-        policies = {name: make_policy(name, mission) for name in names}
+        policies = {name: make_policy(name, mission) for name in names if name is not None}
         facts = [facts_of(name, policy, mission) for name, policy in policies.items()]
     if options.json:
         sys.stdout.write(json.dumps(facts if options.name is None else facts[0], indent=2) + "\n")

@@ -13,10 +13,13 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
 from swarm_mj.simulation.components import TABLE, Components
+from swarm_mj.system.arguments import check_kind, check_names, did_you_mean
 from swarm_mj.system.exit_codes import DONE
-from swarm_mj.system.fields import check_kind, check_names, did_you_mean, former_names, setting
+from swarm_mj.system.fields import former_names, setting
+from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import asset, need
 from swarm_mj.system.reading import read_file
+from swarm_mj.system.streams import check_printable
 from swarm_mj.system.terminal import plain_console
 
 MAX_BYTES = 1_000_000
@@ -64,6 +67,7 @@ def run(options: StudyOptions) -> int:
 
     before = read_missions(Path(named[0]))
     after = read_missions(Path(named[1]))
+    raise_if_interrupted()  # while pandas was loaded, which swallows it
     for cost in COMPARED:
         rows = compared(before, after, cost)
         if len(rows):  # tasks without a cost have none
@@ -101,6 +105,7 @@ def read_study(name: str, *, is_trusted: bool = False) -> Study:
 
 def _study(tables: dict[str, Any], *, is_trusted: bool) -> Study:
     """Return a study from a file's tables; without [missions.NAME], [mission] has its missions."""
+    _check_texts(tables)
     check_names("a study", tables, ("study", "mission", "missions"))
     own = _values("[study]", tables.get("study", {}), Study)
     policies = own.get("policies", DEFAULT_POLICIES)
@@ -132,6 +137,19 @@ def _study(tables: dict[str, Any], *, is_trusted: bool) -> Study:
                 "several studies"
             )
     return Study(**own, regimes=tuple(dict.fromkeys(regimes)))
+
+
+def _check_texts(value: object) -> None:
+    """Raise ValueError for a text in a file that would drive the terminal that shows it."""
+    if isinstance(value, str):
+        check_printable(value, "write it without them")
+    elif isinstance(value, dict):
+        for name, each in value.items():
+            _check_texts(name)
+            _check_texts(each)
+    elif isinstance(value, list):
+        for each in value:
+            _check_texts(each)
 
 
 def _check_names_no_code(own: Given) -> None:

@@ -1,6 +1,6 @@
 """Controllers: their interface, and the paper's (IV-A), which stand, walk or flock.
 
-A new task is a name of `mission.specification.Task` and its controller here, which `controller_of`
+A new task is a name of `mission.team.Task` and its controller here, which `controller_of`
 returns; the type checker finds a task without one. If the controller has a cost (`Costed`), tables,
 charts, files and rewards show it by its name and unit. Unless said otherwise, robots of a task move
 from the start (`Mission.moves`) within walls (`mission.presets.paper`).

@@ -6,6 +6,7 @@ seen in a picture, and are overwritten at the next window.
 
 from collections import OrderedDict
 from collections.abc import Sequence
+from importlib import metadata
 from typing import Any
 
 import numpy as np
@@ -18,7 +19,7 @@ from jaxtyping import Int
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene, compose
-from swarm_mj.protocol.checks import check_robots
+from swarm_mj.protocol.checks import as_array, checked_robots
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.swarm import Swarm
 
@@ -53,6 +54,7 @@ def make_environment(
         ValueError: As `Swarm` does: if the seed is out of range, or if no connected team could be
             drawn or the scene changed the robots.
         TypeError: As `Swarm` does: for what is no mission, or cannot be called.
+        RuntimeError: If dm_control does not work with this MuJoCo; the message says what does.
 
     Example:
         >>> time_step = make_environment(paper("flocking"), seed=1).reset()
@@ -69,7 +71,14 @@ class SwarmPhysics(mujoco.Physics):
 
     def __init__(self, swarm: Swarm, seed: int) -> None:
         model = compose(swarm.mission, scene=swarm.scene).compile()
-        super().__init__(wrapper.MjData(wrapper.MjModel(model)))
+        try:
+            super().__init__(wrapper.MjData(wrapper.MjModel(model)))
+        except AttributeError as error:  # dm_control knows by name what a model has
+            raise RuntimeError(
+                f"dm_control {metadata.version('dm-control')} does not work with MuJoCo "
+                f"{metadata.version('mujoco')} ({error}); pip install 'swarm_mj[dm-control]' "
+                "chooses one that it works with"
+            ) from error
         self.swarm = swarm
         self.restart(seed)
 
@@ -118,9 +127,9 @@ class SwarmTask(_Task):
 
     def before_step(self, action: np.ndarray | Sequence[int], physics: SwarmPhysics) -> None:
         """Set each robot's recipient, itself for silence; raise ValueError for other actions."""
-        recipient = np.asarray(action)[np.newaxis]
-        check_robots("recipient", recipient, (1, physics.swarm.mission.num_robots))
-        physics.recipient = recipient.astype(np.int64)
+        shape = (1, physics.swarm.mission.num_robots)
+        recipient = as_array("recipient", action)[np.newaxis]
+        physics.recipient = checked_robots("recipient", recipient, shape).copy()
 
     def action_spec(self, physics: SwarmPhysics) -> specs.BoundedArray:
         """Return the recipient of each robot, shape (N,), from 0 to N - 1."""

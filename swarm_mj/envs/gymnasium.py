@@ -17,10 +17,11 @@ from jaxtyping import Bool, UInt8
 from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.options import BatchOptions, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
+from swarm_mj.protocol.checks import as_array
 from swarm_mj.replay.recorder import moment
 from swarm_mj.replay.rendering.scene import SceneRenderer, SceneViewer
 from swarm_mj.replay.view import has_display
-from swarm_mj.system.fields import check_choice
+from swarm_mj.system.arguments import check_choice
 
 MODES = ("rgb_array", "human")
 WIDTH = 800  # of a picture [pixels]
@@ -160,7 +161,7 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
                 has begun, or if it is over.
             OSError: In the mode "human", if there is no display.
         """
-        reward = self.batch.step(np.asarray(action)[np.newaxis])
+        reward = self.batch.step(as_array("action", action)[np.newaxis])
         observation, info = self._seen()
         return observation, float(reward[0, 0]), False, self.batch.is_over, info
 

@@ -19,7 +19,8 @@ from swarm_mj.envs.mission_batch import Info, MissionBatch, Observation, seed_or
 from swarm_mj.envs.options import BatchOptions, make_team_batch, team_spaces
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import is_own_set
-from swarm_mj.system.fields import check_names
+from swarm_mj.protocol.checks import as_array, checked_robots
+from swarm_mj.system.arguments import check_names
 
 MODES = ("rgb_array",)  # a window on the screen would show one mission of many
 
@@ -55,6 +56,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self.metadata = rendering(batch.mission, MODES) | {"autoreset_mode": self.autoreset_mode}
         # Of each environment: the batch that flies it, and its row there.
         self._batches = np.full(num_envs, batch, dtype=object)
+        self._num_robots = batch.mission.num_robots
         self._rows = np.arange(num_envs)
         self._is_over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs = [seeding.np_random()[0] for _ in range(num_envs)]  # that draw later seeds
@@ -134,8 +136,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
                 has begun, if one is over in the mode DISABLED, or if no connected team could be
                 drawn.
         """
-        actions = np.asarray(actions)
-        self._check_step(actions)
+        actions = self._checked(actions)
         reward = np.zeros(self.num_envs)
         infos: Info = {}
         final_infos: Info = {}  # of missions that end in this step, and begin anew in it
@@ -144,7 +145,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         for batch in dict.fromkeys(self._batches[~was_over]):
             envs = np.flatnonzero(self._batches == batch)
             rows = self._rows[envs]
-            recipient = batch.flown.views.silence.astype(actions.dtype)
+            recipient = batch.flown.views.silence.copy()
             recipient[rows] = actions[envs]
             reward[envs] = batch.step(recipient)[rows, 0]
             self._is_over[envs] = batch.is_over
@@ -176,17 +177,21 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         """Give back what pictures took."""
         self._screen.close()
 
-    def _check_step(self, actions: np.ndarray) -> None:
+    def _checked(self, actions: np.ndarray) -> Int[np.ndarray, "B N"]:
+        """Return the actions; raise ValueError for any that is no robot, before a batch moves."""
         if self._is_over.any() and self.autoreset_mode == AutoresetMode.DISABLED:
             raise ValueError(
                 f"environment {np.argmax(self._is_over)} is over; begin it anew by reset(options="
                 '{"reset_mask": mask})'
             )
-        if actions.shape != self.action_space.shape:
+        given = as_array("actions", actions).copy()
+        shape = (self.num_envs, self._num_robots)
+        if given.shape != shape:
             raise ValueError(
-                f"actions must have shape {self.action_space.shape}, environments by robots, not "
-                f"{actions.shape}"
+                f"actions must have shape {shape}, environments by robots, not {given.shape}"
             )
+        given[self._is_over] = 0  # whatever they are: these missions begin anew in this step
+        return checked_robots("action", given, shape)
 
     def _begin(self, envs: Int[np.ndarray, "E"], seeds: Sequence[int | None], infos: Info) -> None:
         """Begin these environments' missions in a batch of their own; note their infos."""

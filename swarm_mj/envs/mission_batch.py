@@ -15,13 +15,10 @@ from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
-from swarm_mj.protocol.costs import (
-    WindowCosts,
-    age_of_information,
-    no_packets,
-    velocity_variance,
-)
+from swarm_mj.protocol.checks import checked_robots
+from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.protocol.mission_costs import AOI, BY_REWARD, TASK_COST, VELOCITY_VARIANCE
+from swarm_mj.protocol.packet_counts import no_packets
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
 
@@ -99,6 +96,7 @@ class MissionBatch:
             ValueError: If no mission has begun, they are over, or a recipient is no robot; then
                 nothing has moved.
         """
+        recipient = checked_robots("recipient", recipient, self.shape)
         if self.reward != "credit":
             cost = BY_REWARD[self.reward].of_window(self.fly(recipient))
             if cost is None:

@@ -21,7 +21,7 @@ from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import Channel
 from swarm_mj.simulation.components import Components
-from swarm_mj.system.fields import check_choice
+from swarm_mj.system.arguments import check_choice
 
 
 class RobotTruth(NamedTuple):

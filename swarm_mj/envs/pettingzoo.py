@@ -1,5 +1,6 @@
 """PettingZoo's interface: every robot is an agent, `robot_0` to `robot_{N-1}`."""
 
+from collections.abc import Mapping
 from typing import Any, Unpack
 
 import numpy as np
@@ -12,7 +13,8 @@ from swarm_mj.envs.gymnasium import MODES, Screen, modes_here, rendering
 from swarm_mj.envs.mission_batch import Info, Observation, seed_or_next
 from swarm_mj.envs.options import BatchOptions, make_batch, robot_spaces, truth, truth_space
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.checks import check_robots
+from swarm_mj.protocol.checks import as_array, checked_robots
+from swarm_mj.system.arguments import check_kind
 
 Action = int | np.integer[Any]
 NAME = {"name": "swarm_mj_v0"}
@@ -142,17 +144,17 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
                 then nothing has moved.
             OSError: In the mode "human", if there is no display.
         """
+        check_kind("actions", actions, Mapping, '{"robot_0": 1}')
         [chosen] = self.batch.flown.views.silence.tolist()
         for agent, action in actions.items():
             if agent not in self._robot:
                 names = f"{self.possible_agents[0]} to {self.possible_agents[-1]}"
                 raise ValueError(f"agents are {names}, not {agent!r:.80}; leave it out")
             if agent in self.agents:
-                chosen[self._robot[agent]] = np.squeeze(action)  # some wrap it
+                chosen[self._robot[agent]] = as_array("action", action).squeeze()  # some wrap it
         if not self.agents:
             return {}, {}, {}, {}, {}
-        recipient = np.array([chosen])
-        check_robots("action", recipient, self.batch.shape)
+        recipient = checked_robots("action", [chosen], self.batch.shape)
         reward = self.batch.step(recipient)[0]
         is_over = self.batch.is_over
         seen, infos = self._seen()

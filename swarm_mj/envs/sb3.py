@@ -26,7 +26,7 @@ from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import Activation, MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
-from swarm_mj.system.fields import check_choice
+from swarm_mj.system.arguments import check_choice
 from swarm_mj.system.packages import commit, version
 
 # Of networks that can be stored as policies.

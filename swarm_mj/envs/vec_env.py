@@ -9,11 +9,12 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import seeding
-from jaxtyping import Bool
+from jaxtyping import Bool, Int
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next, seeds_from
+from swarm_mj.protocol.checks import as_array, checked_robots
 
 AGENTS = ("robot", "team")  # what an environment is
 
@@ -68,10 +69,9 @@ class SwarmVecEnv(VecEnv):
         """Fly one window; after the last one, others begin. Bad actions are a ValueError."""
         reward = np.zeros(self.num_envs, np.float32)
         done = np.zeros(self.num_envs, np.bool_)
-        for batch, envs in zip(self.batches, self._envs, strict=True):
-            # Teams smaller than the largest one are padded with columns of silence.
-            recipient = self._actions[envs].reshape(batch.num_missions, -1)
-            paid = batch.step(recipient[:, : batch.mission.num_robots])
+        recipients = self._recipients()  # of all batches: if one is bad, none moves
+        for batch, envs, recipient in zip(self.batches, self._envs, recipients, strict=True):
+            paid = batch.step(recipient)
             reward[envs] = paid[:, : self._per_mission(batch)].ravel() / self.reward_unit
             done[envs] = batch.is_over
         # Of this window: a restart, below, forgets them.
@@ -116,6 +116,19 @@ class SwarmVecEnv(VecEnv):
 
     def close(self) -> None:
         """Do nothing: there is nothing to release."""
+
+    def _recipients(self) -> list[Int[np.ndarray, "B N"]]:
+        """Return the actions batch by batch; raise ValueError for any that is no robot."""
+        shape = (self.num_envs, *(self.action_space.shape or ()))
+        given = as_array("actions", self._actions)
+        if given.shape not in (shape, (*shape, 1)):  # some wrap each number
+            raise ValueError(f"actions must have shape {shape}, not {given.shape}")
+        recipients: list[np.ndarray] = []
+        for batch, envs in zip(self.batches, self._envs, strict=True):
+            # Teams smaller than the largest one are padded with columns of silence.
+            rows = given[envs].reshape(batch.num_missions, -1)[:, : batch.mission.num_robots]
+            recipients.append(checked_robots("action", rows, batch.shape))
+        return recipients
 
     # Training's environment differs in the following.
 

@@ -13,8 +13,9 @@ from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.policies.registry import make_policy_with
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.costs import Packets, WindowCosts
+from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
+from swarm_mj.protocol.packet_counts import Packets
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.mission_radio import radio_of

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from itertools import islice
-from multiprocessing import get_context, resource_tracker
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -107,14 +107,7 @@ class Ray:
             # Its end puts back the handlers of signals that Ray replaces.
             with deferred_interrupt() as is_interrupted, TemporaryDirectory() as parts:
                 _copy_parts(parts, self.files)
-                ray.init(
-                    address=self.address or "local",
-                    # A cluster that runs already has the processors that it has.
-                    num_cpus=None if self.address else self.num_jobs,
-                    runtime_env={"working_dir": parts, "env_vars": SURROUNDINGS},
-                    logging_level="ERROR",
-                    log_to_driver=False,
-                )
+                self._start(ray, parts)
             if is_interrupted():
                 raise KeyboardInterrupt
             do = ray.remote(max_retries=-1)(_do)
@@ -131,9 +124,23 @@ class Ray:
                 done, tasks = ray.wait(tasks)
                 yield from _unpacked(ray.get(done[0]))
         except (ray.exceptions.RayError, RuntimeError) as error:
-            raise OSError(f"Ray gave up: {str(error).strip()}") from error
+            raise OSError(f"Ray gave up: {' '.join(str(error).split())}") from error
         finally:
             ray.shutdown()
+
+    def _start(self, ray: Any, parts: str) -> None:  # noqa: ANN401 - a module
+        """Start Ray, or join one; raise OSError in one line if that cannot be."""
+        try:
+            ray.init(
+                address=self.address or "local",
+                # A cluster that runs already has the processors that it has.
+                num_cpus=None if self.address else self.num_jobs,
+                runtime_env={"working_dir": parts, "env_vars": SURROUNDINGS},
+                logging_level="ERROR",
+                log_to_driver=False,
+            )
+        except Exception as error:  # Ray raises that very class, among others
+            raise OSError(f"Ray did not start: {' '.join(str(error).split())}") from error
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -279,12 +286,26 @@ def _inherited() -> Iterator[None]:
     """Let processes that are started meanwhile inherit SURROUNDINGS, and a mask against Ctrl-C."""
     before = dict(os.environ)
     os.environ.update(SURROUNDINGS)
+    try:
+        with _masked():
+            yield
+    finally:
+        for name in SURROUNDINGS.keys() - before.keys():
+            del os.environ[name]
+        os.environ.update(before)
+
+
+@contextmanager
+def _masked() -> Iterator[None]:
+    """Let processes that are started meanwhile inherit a mask against Ctrl-C, if there are any."""
+    if not hasattr(signal, "pthread_sigmask"):  # Windows, which has no resource tracker either
+        yield
+        return
+    from multiprocessing import resource_tracker
+
     resource_tracker.ensure_running()  # multiprocessing's; to start it lifts all masks
     mask = signal.pthread_sigmask(signal.SIG_BLOCK, INTERRUPTS)
     try:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, mask)
-        for name in SURROUNDINGS.keys() - before.keys():
-            del os.environ[name]
-        os.environ.update(before)

@@ -21,6 +21,7 @@ from swarm_mj.protocol.mission_costs import MISSION_COSTS, MissionCost
 from swarm_mj.simulation.components import CALLED_WITH
 from swarm_mj.system.fields import kind_of
 from swarm_mj.system.reading import open_file
+from swarm_mj.system.streams import check_printable
 from swarm_mj.system.writing import write_bytes
 
 KINDS = {str: pa.string(), int: pa.int64(), float: pa.float64(), bool: pa.bool_()}
@@ -89,6 +90,12 @@ def read_missions(path: Path) -> pd.DataFrame:
             raise ValueError(f"missions {path}: {said}; make them with --parquet") from error
     # What pandas may have written beside the columns, such as an index, is not ours.
     missions = found.to_pandas(ignore_metadata=True)
+    for name, kind in COLUMNS.items():
+        for text in missions[name].dropna().unique() if kind is str else ():
+            try:
+                check_printable(text, "write it without them")
+            except ValueError as error:
+                raise ValueError(f"missions {path}: in {name}, {error}") from error
     is_twice = missions.duplicated(KEYS)
     if is_twice.any():
         twice = missions[is_twice].iloc[0]

@@ -12,7 +12,8 @@ import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_column
-from swarm_mj.mission.specification import NOTHING, OPEN
+from swarm_mj.mission.knowledge import NOTHING
+from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.radio.words import radio_in_words
 from swarm_mj.system.reading import read_json

@@ -11,8 +11,9 @@ from rich.table import Table
 
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
 from swarm_mj.evaluation.table_columns import BRIEF, NONE, WIDE, Shown, number, said
+from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.presets import paper
-from swarm_mj.mission.specification import NOTHING, OPEN
+from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second
 

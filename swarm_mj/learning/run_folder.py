@@ -14,7 +14,7 @@ from swarm_mj.learning.selection import OTHER_FLIGHTS, Row, num_missions
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.gnn.feature_sets import remembers_packets
 from swarm_mj.policies.stored import POLICY
-from swarm_mj.replay.recorder import IN_MEMORY, ON_DISK
+from swarm_mj.replay.replay_size import IN_MEMORY, ON_DISK
 from swarm_mj.simulation.memory import LIBRARIES, TORCH, learned_memory
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check, common_setting, setting

@@ -43,14 +43,16 @@ def streams_of(seeds: Sequence[int]) -> Streams:
 def check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
     """Raise ValueError unless there are seeds, as many as expected, and none is negative."""
     if not hasattr(seeds, "__len__") or isinstance(seeds, str | bytes):
-        raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r}")
+        raise ValueError(f"seeds must be a list, one per mission, such as [1], not {seeds!r:.80}")
     is_whole = all(
         isinstance(seed, Integral) and not isinstance(seed, bool) and 0 <= seed <= MAX_SEED
         for seed in seeds
     )
     if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
         count = "one or more" if expected is None else str(expected)
-        raise ValueError(f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)}")
+        raise ValueError(
+            f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)!s:.80}"
+        )
 
 
 @runtime_checkable
@@ -71,7 +73,8 @@ class Stream:
     def __init__(
         self, rngs: Sequence[np.random.Generator], draw: Draw, shape: tuple[int, ...]
     ) -> None:
-        self._rngs, self._draw = rngs, draw
+        self._rngs = rngs
+        self._draw = draw
         self._block = np.empty((BLOCK, len(rngs), *shape))
         self._next = BLOCK
 

@@ -29,10 +29,13 @@ def gather_connected(
     Two robots at most `range_m` apart are neighbours. Those reached fill `members`, and are added
     to `is_met`, whose robots need not be reached.
     """
-    members[0], is_met[first] = first, True
-    num_members, num_spread = 1, 0
+    members[0] = first
+    is_met[first] = True
+    num_members = 1
+    num_spread = 0  # of the members, those whose neighbours have joined them
     while num_spread < num_members:
-        i, num_spread = members[num_spread], num_spread + 1
+        i = members[num_spread]
+        num_spread += 1
         for j in range(position_m.shape[0]):
             if not is_met[j] and squared_distance(position_m, i, j) <= range_m * range_m:
                 is_met[j] = True
@@ -57,8 +60,10 @@ def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B 
 def _grow(position_m: Float[np.ndarray, "N 2"], is_edge: Bool[np.ndarray, "N N"]) -> None:
     """Mark the tree's edges: Prim's algorithm from robot 0."""
     num_robots = position_m.shape[0]
-    nearest, squared_m2 = np.zeros(num_robots, dtype=np.int64), np.full(num_robots, np.inf)
-    in_tree, added = np.zeros(num_robots, dtype=np.bool_), 0
+    nearest = np.zeros(num_robots, dtype=np.int64)  # in the tree, of each robot outside it
+    squared_m2 = np.full(num_robots, np.inf)  # of the distance to that one
+    in_tree = np.zeros(num_robots, dtype=np.bool_)
+    added = 0
     for _ in range(num_robots - 1):
         in_tree[added] = True
         closest = -1
@@ -67,7 +72,8 @@ def _grow(position_m: Float[np.ndarray, "N 2"], is_edge: Bool[np.ndarray, "N N"]
                 continue
             apart_m2 = squared_distance(position_m, added, j)
             if apart_m2 < squared_m2[j]:
-                squared_m2[j], nearest[j] = apart_m2, added
+                squared_m2[j] = apart_m2
+                nearest[j] = added
             if closest < 0 or squared_m2[j] < squared_m2[closest]:
                 closest = j
         is_edge[closest, nearest[closest]] = is_edge[nearest[closest], closest] = True

@@ -29,8 +29,10 @@ def largest_part(position_m: Float[np.ndarray, "N 2"], range_m: float) -> Bool[n
     That is everyone if its algebraic connectivity (Fiedler 1973), which the paper tests (IV-B), is
     positive.
     """
-    num_robots, num_most = len(position_m), 0
-    is_met, members = np.zeros(num_robots, dtype=np.bool_), np.empty(num_robots, dtype=np.int64)
+    num_robots = len(position_m)
+    num_most = 0
+    is_met = np.zeros(num_robots, dtype=np.bool_)
+    members = np.empty(num_robots, dtype=np.int64)
     part = np.zeros(num_robots, dtype=np.bool_)
     for first in range(num_robots):
         if not is_met[first]:
@@ -63,14 +65,15 @@ def connected_positions(
     ValueError if all draws were disconnected, or the area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
-    position_m, is_kept = np.empty((num_robots, 2)), np.zeros(num_robots, dtype=np.bool_)
+    position_m = np.empty((num_robots, 2))
+    is_kept = np.zeros(num_robots, dtype=np.bool_)
     find = largest_part_at or partial(largest_part, range_m=range_m)
     for _ in range(num_draws):
         _draw_free(position_m, is_kept, half_side_m, rng, is_blocked_at)
         part = find(position_m)
-        is_whole, is_kept = bool(np.all(part)), part & keeps_largest
-        if is_whole:
+        if np.all(part):
             return position_m
+        is_kept = part & keeps_largest
     raise ValueError(
         f"no connected team in {num_draws} draws: {num_robots} robots with a range of {range_m:g} "
         f"m are too sparse for {_area(half_side_m)}; raise the range ratio or the density"

@@ -4,7 +4,10 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Unpack
 
-from swarm_mj.mission.specification import OPEN, Mission, MissionFields, Task, TaskAndFields
+from swarm_mj.mission.keywords import MissionFields, TaskAndFields
+from swarm_mj.mission.specification import Mission
+from swarm_mj.mission.surroundings import OPEN
+from swarm_mj.mission.team import Task
 from swarm_mj.system.fields import check_value
 
 

@@ -1,58 +1,30 @@
 """Arenas: obstacles in the area, at a size that grows with the team.
 
-Obstacles attenuate packets and, in `contact` physics, reflect robots. They are the static geoms of
-group `OBSTACLE_GROUP`. The penetration loss of one is its first `user` number [dB]; without one, or
-with 0, that of its material's name (`MATERIALS`), or `DEFAULT_LOSS_DB`.
-
-To add an arena, write its function beside what it is made of, and name it in `ARENAS`.
+Obstacles attenuate packets and, in `contact` physics, reflect robots. To add an arena, write its
+function here, of a material of `physics.materials`, and name it in `ARENAS`.
 """
 
 import os
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable
 from itertools import product
 from pathlib import Path
-from xml.etree import ElementTree
 
-import numpy as np
 from mujoco._enums import mjtGeom
-from mujoco._functions import mj_kinematics
 from mujoco._specs import MjSpec
-from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.specification import OPEN, SQUARE_METRES_PER_KM2
-from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
-from swarm_mj.system.decibels import from_db
-from swarm_mj.system.fields import did_you_mean
+from swarm_mj.mission.surroundings import OPEN
+from swarm_mj.mission.team import SQUARE_METRES_PER_KM2
+from swarm_mj.physics.arena_files import add_file, read_arena
+from swarm_mj.physics.materials import BUILDING, LIGHT_WALL, TREE, Material
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP, idle_obstacles
+from swarm_mj.system.arguments import did_you_mean
 
 Arena = Callable[[MjSpec, Mission], None]  # adds the obstacles
 
-OBSTACLE_GROUP = 1
-MESH = 7  # as MuJoCo numbers it
 BOX_SHAPE = mjtGeom.mjGEOM_BOX
 CYLINDER_SHAPE = mjtGeom.mjGEOM_CYLINDER
 HALF_HEIGHT_M = 5.0  # of obstacles: well above the robots
-NOT_FINITE = ("nan", "inf", "infinity")
-FOLDERS = ("meshdir", "texturedir", "assetdir")  # of files that a compiler element names
-MAX_REPLICAS = 10_000  # of a <replicate>; more would be compiled for minutes
-NAMING = ("name", "class", "childclass", "material", "mesh", "file")  # attributes that are text
-DEFAULT_LOSS_DB = 10.0  # of obstacles in a file that neither say their loss nor name a material
-
-MATERIALS: dict[str, "Material"] = {}  # by name; making one enters it here
-
-
-@dataclass(frozen=True, kw_only=True)
-class Material:
-    """A material of obstacles; geoms, those of a file too, name it."""
-
-    name: str
-    loss_db: float  # per obstacle crossed [dB]
-    rgba: tuple[float, float, float, float]  # red, green, blue and opacity, from 0 to 1
-    source: str  # of the loss
-
-    def __post_init__(self) -> None:
-        MATERIALS[self.name] = self
 
 
 def arena_of(mission: Mission) -> Arena | None:
@@ -61,7 +33,7 @@ def arena_of(mission: Mission) -> Arena | None:
     if name in ARENAS:
         return ARENAS[name]
     if os.path.isfile(name):
-        return _from_file
+        return add_file
     if os.path.isdir(name):
         raise ValueError(f"arena {name} is a directory; name an MJCF file in it")
     if Path(name).suffix or os.sep in name:
@@ -72,9 +44,9 @@ def arena_of(mission: Mission) -> Arena | None:
 
 def notes_on(mission: Mission) -> list[str]:
     """Return a note on each obstacle in a file that neither robots nor packets can meet."""
-    if arena_of(mission) is not _from_file:
+    if arena_of(mission) is not add_file:
         return []
-    idle = idle_obstacles(_read(mission.arena).compile(), mission)
+    idle = idle_obstacles(read_arena(mission.arena).compile(), mission)
     return [
         f"arena {mission.arena}: {name} does nothing, as it stands {where}"
         for name, where in idle.items()
@@ -83,12 +55,6 @@ def notes_on(mission: Mission) -> list[str]:
 
 BLOCK_PITCH_M = 200.0  # from street to street
 BLOCK_M = 110.0  # side of a city block; the rest of the pitch is street
-BUILDING = Material(
-    name="building",
-    loss_db=25.0,
-    rgba=(0.36, 0.40, 0.47, 1.0),
-    source="two outer walls of 7 dB (COST 231 1999, section 4.7) and the rooms between them",
-)
 
 
 def blocks(spec: MjSpec, mission: Mission) -> None:
@@ -103,18 +69,6 @@ def blocks(spec: MjSpec, mission: Mission) -> None:
 ROOM_M = 170.0  # side of a room
 DOOR_M = 25.0  # width of the door in the middle of every wall between two rooms
 WALL_M = 1.0  # thickness of these walls
-LIGHT_WALL = Material(
-    name="light wall",
-    loss_db=3.4,
-    rgba=(0.45, 0.50, 0.58, 1.0),
-    source="COST 231 (1999), section 4.7, at 1.8 GHz",
-)
-HEAVY_WALL = Material(  # for files: no arena of the package has it
-    name="heavy wall",
-    loss_db=6.9,
-    rgba=(0.40, 0.44, 0.52, 1.0),
-    source="COST 231 (1999), section 4.7, at 1.8 GHz",
-)
 
 
 def rooms(spec: MjSpec, mission: Mission) -> None:
@@ -134,12 +88,6 @@ def rooms(spec: MjSpec, mission: Mission) -> None:
 
 TREES_PER_KM2 = 100.0
 TREE_RADIUS_M = 6.0
-TREE = Material(
-    name="tree",
-    loss_db=6.0,
-    rgba=(0.20, 0.38, 0.30, 1.0),
-    source="12 m of leaves at about 0.5 dB/m (ITU-R P.833)",
-)
 
 
 def forest(spec: MjSpec, mission: Mission) -> None:
@@ -152,103 +100,6 @@ def forest(spec: MjSpec, mission: Mission) -> None:
 
 
 ARENAS: dict[str, Arena | None] = {OPEN: None, "blocks": blocks, "forest": forest, "rooms": rooms}
-
-
-def _from_file(spec: MjSpec, mission: Mission) -> None:
-    """Add the contents of a user's MJCF file, or raise ValueError."""
-    theirs = _read(mission.arena)
-    try:
-        model = theirs.compile()
-        num_obstacles = len(obstacles_of(model).kind)
-    except ValueError as error:
-        raise _refused(mission.arena, error) from error
-    if theirs.joints:
-        moves = theirs.joints[0].parent.name or "a body without a name"
-        raise ValueError(f"arena {mission.arena}: {moves} has a joint, but obstacles stand still")
-    if num_obstacles == 0:
-        raise ValueError(
-            f"arena {mission.arena} has no obstacle, which is any geom of group {OBSTACLE_GROUP} "
-            f'but a plane or a height field; give walls group="{OBSTACLE_GROUP}"'
-        )
-    idle = idle_obstacles(model, mission)
-    if len(idle) == num_obstacles:
-        name, where = next(iter(idle.items()))
-        said = f"no obstacle can do anything; {name} stands {where}"
-        raise ValueError(f"arena {mission.arena}: {said}")
-    spec.nuser_geom = max(spec.nuser_geom, theirs.nuser_geom)  # or their losses would be cut off
-    spec.attach(theirs, frame=spec.worldbody.add_frame(), prefix="arena/")
-
-
-def _read(file: str) -> MjSpec:
-    """Read an MJCF file; raise ValueError in one line that names the file, as MuJoCo does not."""
-    path = Path(file).absolute()  # MuJoCo finds what included files include by no other
-    try:
-        elements = list(_elements(path))
-        folders = {path.parent}
-        for element in elements:
-            if element.tag == "compiler":
-                leads = (element.get(key) for key in FOLDERS)
-                folders.update(path.parent / lead for lead in leads if lead)
-        for element in elements:
-            _check_element(element, folders)
-        return MjSpec.from_file(str(path))
-    except ValueError as error:
-        raise _refused(file, error) from error
-
-
-def _elements(path: Path, above: tuple[Path, ...] = ()) -> Iterator[ElementTree.Element]:
-    """Yield the elements of a file, which those above include, and of those that it includes."""
-    files = (*above, path)
-    folders = {files[0].parent, path.parent}  # MuJoCo looks in both
-    try:
-        root = ElementTree.parse(path)
-    except ElementTree.ParseError as error:
-        line = error.position[0]
-        said = str(error).partition(":")[0]
-        raise ValueError(f"{path.name}, line {line}: not well-formed XML ({said})") from error
-    for element in root.iter():
-        yield element
-        if element.tag == "include":
-            _check_element(element, folders)  # before it is opened
-            for folder in folders:
-                included = folder / element.get("file", "")
-                if included.is_file() and not any(map(included.samefile, files)):
-                    yield from _elements(included, files)
-
-
-def _check_element(element: ElementTree.Element, folders: set[Path]) -> None:
-    """Raise ValueError for numbers that are none, and for pipes and replicas without an end."""
-    for key, value in element.attrib.items():
-        if key in NAMING:
-            continue
-        for word in value.lower().split():
-            if word.lstrip("+-") in NOT_FINITE:
-                named = element.get("name", "without a name")
-                raise ValueError(f"{element.tag} {named} has {word} in {key}")
-    _check_count(element)
-    _check_file(element, folders)
-
-
-def _check_count(element: ElementTree.Element) -> None:
-    """Raise ValueError for more replicas than compile in a while."""
-    count = element.get("count", "")
-    if element.tag == "replicate" and count.isdigit() and int(count) > MAX_REPLICAS:
-        raise ValueError(f"replicate has a count of {count}; {MAX_REPLICAS} are allowed")
-
-
-def _check_file(element: ElementTree.Element, folders: set[Path]) -> None:
-    """Raise ValueError for what a file's name leads to, but is none: MuJoCo would wait for it."""
-    name = element.get("file")
-    if not name:
-        return
-    for folder in folders:
-        path = folder / name
-        if path.exists() and not path.is_file():
-            raise ValueError(f"{element.tag} {name} is a folder, a pipe or a device; name a file")
-
-
-def _refused(file: str, error: ValueError) -> ValueError:
-    return ValueError(f"arena {file}: {' '.join(str(error).split())}")
 
 
 def _add(
@@ -281,73 +132,3 @@ def _halton(n: int, base: int) -> float:
         point += digit * share
         share /= base
     return point
-
-
-def obstacles_of(model: MjModel) -> Obstacles:
-    """Return the obstacles of a compiled scene, or raise ValueError by a loss (`loss_db_of`)."""
-    data = MjData(model)
-    mj_kinematics(model, data)
-    found = np.array(obstacle_geoms(model), dtype=int)
-    kind = model.geom_type[found].copy()
-    size_m = model.geom_size[found].copy()
-    centre_m = data.geom_xpos[found].copy()
-    rotation = data.geom_xmat[found].reshape(-1, 3, 3).copy()
-    for o in np.flatnonzero(kind == MESH):
-        middle_m, half_m = np.split(model.geom_aabb[found[o]], 2)
-        centre_m[o] += rotation[o] @ middle_m
-        kind[o] = BOX
-        size_m[o] = half_m
-    is_finite = np.isfinite(np.column_stack([centre_m, size_m])).all(axis=1)
-    if not np.all(is_finite):
-        g = int(found[np.argmin(is_finite)])
-        named = model.geom(g).name or f"number {g}"
-        raise ValueError(f"geom {named} is of infinite size, or infinitely far; give it numbers")
-    return Obstacles(
-        kind=kind.astype(np.int64),
-        centre_m=centre_m,
-        rotation=rotation,
-        size_m=size_m,
-        reach_m=np.maximum(model.geom_rbound[found], 0.0),
-        power_left=from_db(-np.array([loss_db_of(model, int(g)) for g in found])),
-    )
-
-
-def obstacle_geoms(model: MjModel) -> list[int]:
-    """Return the geoms that are obstacles."""
-    stands_still = model.body_weldid[model.geom_bodyid] == 0
-    is_solid = np.isin(model.geom_type, (*KINDS, MESH))
-    is_obstacle = stands_still & is_solid & (model.geom_group == OBSTACLE_GROUP)
-    return np.flatnonzero(is_obstacle).tolist()
-
-
-def idle_obstacles(model: MjModel, mission: Mission) -> dict[str, str]:
-    """Return the obstacles that neither robots nor packets can meet, and where they stand."""
-    reach_m = mission.half_side_m if mission.has_walls else np.inf  # from the centre, per axis
-    found = obstacles_of(model)
-    idle: dict[str, str] = {}
-    for o, g in enumerate(obstacle_geoms(model)):
-        # Of the box around it that MuJoCo keeps, in the obstacle's frame; a ball may be narrower.
-        half_m = np.abs(found.rotation[o]) @ model.geom_aabb[g, 3:]
-        half_m = np.minimum(half_m, found.reach_m[o])
-        name = f"geom {model.geom(g).name or f'number {g}'}"
-        off_m = np.abs(found.centre_m[o] - [0.0, 0.0, ROBOT_HEIGHT_M]) - half_m
-        if np.any(off_m[:2] > reach_m):
-            idle[name] = f"outside the area of {2 * reach_m:.0f} m by {2 * reach_m:.0f} m"
-        elif off_m[2] > ROBOT_RADIUS_M:
-            side = "above" if found.centre_m[o, 2] > ROBOT_HEIGHT_M else "below"
-            idle[name] = f"{side} the robots, which are {ROBOT_HEIGHT_M:g} m above the floor"
-    return idle
-
-
-def loss_db_of(model: MjModel, g: int) -> float:
-    """Return an obstacle's penetration loss [dB]; raise ValueError if negative or not finite."""
-    material = int(model.geom_matid[g])
-    named = model.mat(material).name if material >= 0 else ""
-    known = MATERIALS.get(named)
-    loss_db = DEFAULT_LOSS_DB if known is None else known.loss_db
-    if model.nuser_geom > 0 and model.geom_user[g, 0] != 0.0:  # 0 where a geom has none
-        loss_db = float(model.geom_user[g, 0])
-    if not (np.isfinite(loss_db) and loss_db >= 0.0):
-        geom = f"geom {model.geom(g).name or f'number {g}'}"
-        raise ValueError(f"the penetration loss of {geom} must be 0 dB or more, not {loss_db:g}")
-    return loss_db

@@ -17,11 +17,14 @@ def footprints(obstacles: Obstacles, height_m: float) -> list[Float[np.ndarray, 
 
     outlines = []
     for n, kind in enumerate(obstacles.kind):
-        rotation, centre_m = obstacles.rotation[n], obstacles.centre_m[n]
+        rotation = obstacles.rotation[n]
+        centre_m = obstacles.centre_m[n]
         points_m = _surface(int(kind), obstacles.size_m[n]) @ rotation.T + centre_m
         # The outline is the hull of where lines from the points above to those below pass.
-        is_above = points_m[:, 2] > height_m
-        above, below = points_m[is_above][:, None], points_m[~is_above][None]
+        _, _, z_m = points_m.T
+        is_above = z_m > height_m
+        above = points_m[is_above][:, None]
+        below = points_m[~is_above][None]
         share = (above[..., 2:] - height_m) / (above[..., 2:] - below[..., 2:])
         cut = (above + share * (below - above))[..., :2].reshape(-1, 2)
         if len(cut) > 2:

@@ -10,7 +10,8 @@ from mujoco._enums import mjtDisableBit
 from mujoco._specs import MjsGeom, MjSpec
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
-from swarm_mj.physics.arenas import OBSTACLE_GROUP, arena_of
+from swarm_mj.physics.arenas import arena_of
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.packages import asset
 

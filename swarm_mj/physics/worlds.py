@@ -17,7 +17,7 @@ from mujoco import batch
 from mujoco._structs import MjModel  # private: type checkers see it only there
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.arenas import obstacles_of
+from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.system.compiled import compiled
@@ -98,9 +98,9 @@ class Physics:
             raise ValueError(f"acceleration must have shape {shape}, not {given.shape}")
         if not _are_finite(given):
             b, i, _ = np.argwhere(~np.isfinite(given))[0]
+            x, y = given[b, i]
             raise ValueError(
-                f"acceleration must be finite, not ({given[b, i, 0]:g}, {given[b, i, 1]:g}) "
-                f"of robot {i} in mission {b}"
+                f"acceleration must be finite, not ({x:g}, {y:g}) of robot {i} in mission {b}"
             )
 
     def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
@@ -112,17 +112,17 @@ class Physics:
         )
         mission = self._mission
         _kick(
-            self._qpos,
-            self._qvel,
-            self._ctrl,
-            acceleration_mps2,
-            mission.window_s,
-            mission.max_acceleration_mps2,
-            mission.max_velocity_mps,
-            self._wall_m,
-            mission.wall_hit == "clip",
-            states.position_m,
-            states.velocity_mps,
+            qpos=self._qpos,
+            qvel=self._qvel,
+            ctrl=self._ctrl,
+            acceleration=acceleration_mps2,
+            dt_s=mission.window_s,
+            limit_mps2=mission.max_acceleration_mps2,
+            limit_mps=mission.max_velocity_mps,
+            wall_m=self._wall_m,
+            clips=mission.wall_hit == "clip",
+            position=states.position_m,
+            velocity=states.velocity_mps,
         )
 
     def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:

@@ -1,5 +1,6 @@
 """Policies, whose type is what they may know: local views, or the truth."""
 
+import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
 from typing import NamedTuple
@@ -12,9 +13,11 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.about import About
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
-from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, RequestResponse, WindowProtocol
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.protocol.window_protocols import DoubleBroadcast, RequestResponse, WindowProtocol
 from swarm_mj.radio.mission_radio import Belief, TrueLinks
 
+LARGEST = 2**63 - 1  # among the parameters: replays keep no larger integer
 Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
 
 
@@ -117,11 +120,28 @@ class Policy:
 
 def check_parameters(policy: Policy) -> None:
     """Raise ValueError for a parameter that a file of results could not hold."""
+    whose = type(policy).__name__
+    if not isinstance(policy.parameters, Mapping):
+        raise ValueError(
+            f"parameters of {whose} must be a dictionary of numbers by their names, not "
+            f"{policy.parameters!r:.80}"
+        )
     for name, value in policy.parameters.items():
+        if not isinstance(name, str):
+            raise ValueError(f"a parameter of {whose} must have a text as its name, not {name!r}")
         if value is not None and type(value) not in (bool, int, float, str):
             raise ValueError(
-                f"parameter {name} of {type(policy).__name__} must be a plain number, a text, True "
-                f"or False, not {value!r:.80} of the type {type(value).__name__}; convert it"
+                f"parameter {name} of {whose} must be a plain number, a text, True or False, not "
+                f"{value!r:.80} of the type {type(value).__name__}; convert it"
+            )
+        if isinstance(value, float) and not math.isfinite(value):
+            way_out = "give it a number, or None"
+            raise ValueError(f"parameter {name} of {whose} must be finite, not {value}; {way_out}")
+        if isinstance(value, int) and not -LARGEST <= value <= LARGEST:
+            size = f"one of {value.bit_length() + 1}"
+            raise ValueError(
+                f"parameter {name} of {whose} must be an integer of 64 bits at most, not {size}; "
+                "make it a float"
             )
 
 

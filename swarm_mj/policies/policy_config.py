@@ -9,6 +9,7 @@ import numpy as np
 
 from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features
 from swarm_mj.system.fields import check, setting
+from swarm_mj.system.streams import check_printable
 
 SUFFIX = ".safetensors"  # of a stored policy's file
 Edges = Literal["paper", "reference", "both"]
@@ -135,6 +136,7 @@ def check_fit(network: GnnShape, features: str) -> None:
 def _check_num_features(given: int, features: str) -> None:
     # A user's own set is not imported, as its name may stand in a file: it may have any number.
     if is_own_set(features):
+        check_printable(features, "write it without them")
         return
     expected = num_features(features)
     if given != expected:

@@ -15,7 +15,8 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.about import FEW_BYTES, FromPaper, Information, Listed, Look, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy, Parameters, Policy
-from swarm_mj.protocol.window import DoubleBroadcast, LocalViews, WindowProtocol
+from swarm_mj.protocol.window import LocalViews
+from swarm_mj.protocol.window_protocols import DoubleBroadcast, WindowProtocol
 from swarm_mj.system.compiled import compiled
 
 

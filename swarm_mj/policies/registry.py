@@ -19,12 +19,17 @@ from swarm_mj.policies.about import About, Listed, VariantOf
 from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.policy import (
+    CentralisedPolicy,
+    DecentralisedPolicy,
+    Policy,
+    check_parameters,
+)
 from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.policy_config import SUFFIX
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.system.fields import check_kind, did_you_mean, unwrapped
+from swarm_mj.system.arguments import check_kind, did_you_mean, unwrapped
 from swarm_mj.system.packages import asset, need
 from swarm_mj.system.user_code import files_named, is_own, make
 
@@ -203,11 +208,11 @@ def _learned(arguments: PolicyArguments, name: str, mission: Mission) -> Policy:
 
 def _own(name: str, mission: Mission) -> Policy:
     policy = make("policy", name, mission)
-    if isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
-        return policy
-    raise ValueError(
-        f"policy {name} must make a DecentralisedPolicy or a CentralisedPolicy, not {policy!r:.80}"
-    )
+    if not isinstance(policy, CentralisedPolicy | DecentralisedPolicy):
+        kinds = "a DecentralisedPolicy or a CentralisedPolicy"
+        raise ValueError(f"policy {name} must make {kinds}, not {policy!r:.80}")
+    check_parameters(policy)
+    return policy
 
 
 def is_stored(name: str) -> bool:
@@ -291,7 +296,10 @@ def with_payload(names: Sequence[str], payload: str) -> list[str]:
 
 def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
     """Raise ValueError unless own feature sets that were named are those of some policy."""
-    used = {policy.parameters.get("features") for policy in policies}
+    used: set[object] = set()
+    for policy in policies:
+        check_parameters(policy)  # they may be of a user's own, and anything
+        used.add(policy.parameters.get("features"))
     for name in features:
         if name not in used:
             raise ValueError(f"no policy here was trained on the features {name}; leave them out")

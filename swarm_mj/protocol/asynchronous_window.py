@@ -14,7 +14,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.packets import entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import Phase, respondents, transmit
+from swarm_mj.protocol.window import Decide, Move, Phase, respondents, transmit
 from swarm_mj.radio.asynchronous import AsynchronousChannel
 
 
@@ -27,8 +27,8 @@ class _Slot(NamedTuple):
 
 def window(
     buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
+    decide: Decide,
+    move: Move,
     channel: AsynchronousChannel,
     now: Float[np.ndarray, "B"],
     *,
@@ -38,6 +38,8 @@ def window(
 
     Slots must be played in order, and each of them once.
     """
+    recipient = decide(())
+    states = move()
     t = now + SLOT_WINDOWS
     record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
     request = _play_slot(buffers, states, recipient, channel, t)
@@ -55,7 +57,7 @@ def broadcast(
     *,
     silence_is_attempt: bool = False,
 ) -> Phase:
-    """Play a single slot, whose packets nobody answers; arguments as in `window`."""
+    """Play a single slot, whose packets nobody answers; arguments as in `window.broadcast`."""
     t = now + SLOT_WINDOWS
     record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
     return _play_slot(buffers, states, recipient, channel, t).phase
@@ -70,8 +72,9 @@ def _play_slot(
 ) -> _Slot:
     """Transmit in the slot that ends at t, and merge what arrives in it."""
     phase = transmit(states, recipient, channel, t)
-    late, punctual = (Phase(*each) for each in channel.split(phase.heard))
-    merge(buffers, late.heard, entries_sent(buffers, late.recipient))
+    arrivals = channel.split(phase.heard)
+    merge(buffers, arrivals.heard_late, entries_sent(buffers, arrivals.late))
     observe_self(buffers, states, t)
-    merge(buffers, punctual.heard, entries_sent(buffers, punctual.recipient))
+    merge(buffers, arrivals.heard_now, entries_sent(buffers, arrivals.punctual))
+    punctual = Phase(recipient=arrivals.punctual, heard=arrivals.heard_now)
     return _Slot(phase=phase, punctual=punctual)

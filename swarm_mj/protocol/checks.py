@@ -5,27 +5,45 @@ Index order: `[b, i]` is robot `i` of mission `b`.
 
 import numpy as np
 from jaxtyping import Float, Int
+from numpy.typing import ArrayLike
 
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.radio.free_space import Channel
+from swarm_mj.system.arguments import name_of
 from swarm_mj.system.compiled import compiled
-from swarm_mj.system.fields import name_of
 from swarm_mj.system.user_code import is_ours
 
 
-def check_robots(
-    what: str, robots: np.ndarray, shape: tuple[int, int], *, may_broadcast: bool = False
-) -> None:
-    """Raise ValueError, naming `what`, unless each robot of B missions has chosen one robot."""
-    if robots.shape != shape:
-        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {robots.shape}")
-    if robots.dtype.kind not in "iu":
-        raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {robots.dtype}")
-    low = BROADCAST if may_broadcast else 0
-    if not _are_between(robots, low, shape[1]):
-        b, i = np.argwhere((robots < low) | (robots >= shape[1]))[0]
+def checked_robots(
+    what: str, robots: ArrayLike, shape: tuple[int, int], *, may_broadcast: bool = False
+) -> Int[np.ndarray, "B N"]:
+    """Return the robots that those of B missions chose, in the integers that compiled loops take.
+
+    Raises ValueError, naming `what`, unless each robot has chosen one robot.
+    """
+    given = as_array(what, robots)
+    if given.shape != shape:
+        raise ValueError(f"{what} must have shape {shape}, missions by robots, not {given.shape}")
+    if given.dtype.kind not in "iu":
+        raise ValueError(f"{what} must be integers from 0 to {shape[1] - 1}, not {given.dtype}")
+    # The same array, unless its numbers have another width or another byte order.
+    chosen = given.astype(np.int64, copy=False)
+    # No unsigned number is below 0, but the largest of them would become BROADCAST.
+    low = BROADCAST if may_broadcast and given.dtype.kind == "i" else 0
+    if not _are_between(chosen, low, shape[1]):
+        b, i = np.argwhere((chosen < low) | (chosen >= shape[1]))[0]
         where = f"{what} of robot {i} in mission {b}"
-        raise ValueError(f"{where} must be from 0 to {shape[1] - 1}, not {robots[b, i]}")
+        raise ValueError(f"{where} must be from 0 to {shape[1] - 1}, not {given[b, i]}")
+    return chosen
+
+
+def as_array(what: str, given: object) -> np.ndarray:
+    """Return what was given as an array; raise ValueError for lists of different lengths."""
+    try:
+        return np.asarray(given)
+    except ValueError as error:
+        rule = f"{what} must be an array, or lists of the same length"
+        raise ValueError(f"{rule}, not {given!r:.80}") from error
 
 
 def checked_decode(
@@ -38,9 +56,9 @@ def checked_decode(
     """
     if is_ours(channel):
         return channel(position_m, recipient.copy())  # in the one layout it is compiled for
-    heard = np.array(channel(position_m.copy(), recipient.copy()))
     name = name_of(channel)
-    check_robots(f"channel {name}: sender heard", heard, recipient.shape)
+    answer = np.array(channel(position_m.copy(), recipient.copy()))
+    heard = checked_robots(f"channel {name}: sender heard", answer, recipient.shape)
     identity = np.arange(recipient.shape[1])
     is_silent = recipient == identity
     is_impossible = (heard != identity) & np.take_along_axis(is_silent, heard, axis=1)

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers, merge_newer, write_attempt, write_own
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import Phase, answer, silence
+from swarm_mj.protocol.window import Decide, Move, Phase, answer, silence
 from swarm_mj.radio.free_space import FreeSpaceRadio, decode_strongest
 from swarm_mj.system.compiled import compiled
 
@@ -49,17 +49,27 @@ class _Radio(NamedTuple):
 
 def window(
     buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
+    decide: Decide,
+    move: Move,
     channel: FreeSpaceRadio,
     now: Float[np.ndarray, "B"],
     *,
     silence_is_attempt: bool = False,
 ) -> tuple[Phase, Phase]:
     """Play one window of requests and responses; arguments as in `protocol.window.window`."""
+    recipient = decide(())
+    states = move()
     request = Phase(recipient=_own_copy(recipient), heard=_unfilled(recipient))
     response = Phase(recipient=_unfilled(recipient), heard=_unfilled(recipient))
-    _play(buffers, states, channel, now, silence_is_attempt, request, response)
+    _play(
+        buffers=buffers,
+        states=states,
+        channel=channel,
+        now=now,
+        silence_is_attempt=silence_is_attempt,
+        request=request,
+        response=response,
+    )
     return request, response
 
 
@@ -72,9 +82,17 @@ def broadcast(
     *,
     silence_is_attempt: bool = False,
 ) -> Phase:
-    """Play a single slot, whose packets nobody answers; arguments as in `window`."""
+    """Play a single slot, whose packets nobody answers; arguments as in `window.broadcast`."""
     phase = Phase(recipient=_own_copy(recipient), heard=_unfilled(recipient))
-    _play(buffers, states, channel, now, silence_is_attempt, phase, None)
+    _play(
+        buffers=buffers,
+        states=states,
+        channel=channel,
+        now=now,
+        silence_is_attempt=silence_is_attempt,
+        request=phase,
+        response=None,
+    )
     return phase
 
 
@@ -170,7 +188,15 @@ def _compiled_play(
         _broadcast(known, truth, radio, request, now, silence_is_attempt)
     else:
         response = Phase(recipient=answered, heard=heard_answer)
-        _window(known, truth, radio, request, response, now, silence_is_attempt)
+        _window(
+            known=known,
+            truth=truth,
+            radio=radio,
+            request=request,
+            response=response,
+            now=now,
+            silence_is_attempt=silence_is_attempt,
+        )
 
 
 @compiled()

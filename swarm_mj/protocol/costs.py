@@ -1,4 +1,4 @@
-"""The costs (II-C, IV-A): age of information, velocity variance, packets."""
+"""The costs of a window (II-C, IV-A): age of information, velocity variance, packets."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
@@ -8,38 +8,15 @@ from jaxtyping import Bool, Float, Int, Shaped
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NEVER, Buffers
+from swarm_mj.protocol.packet_counts import (
+    COUNTS,
+    PACKET_COUNTS,
+    Packets,
+    count_addressed,
+    count_broadcasts,
+)
 from swarm_mj.protocol.window import Phase
 from swarm_mj.system.compiled import compiled
-
-
-class Packets(NamedTuple):
-    """The fates of one window's packets in every mission [packets].
-
-    Addressed packets (Alg. 1) are delivered or lost. A broadcast (IV-C) has no addressee: it is
-    heard or not. Counts of the other kind are nan.
-    """
-
-    sent: Float[np.ndarray, "B"]  # requests or broadcasts, no responses
-    transmitted: Float[np.ndarray, "B"]  # all that were on the air, responses too
-
-    attempted: Float[np.ndarray, "B"]  # requests, each to one recipient
-    delivered: Float[np.ndarray, "B"]  # of these, decoded by the recipient
-    lost: Float[np.ndarray, "B"]  # and of these, not
-    overheard: Float[np.ndarray, "B"]  # receptions of requests and responses meant for another
-    answered: Float[np.ndarray, "B"]  # responses that the first sender decoded
-
-    heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
-    receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
-
-
-class SlotCounts(NamedTuple):
-    """Counts of the packets of one slot in one mission, before they have fates."""
-
-    sent: int
-    delivered: int  # decoded by their recipient
-    overheard: int  # times that a robot decoded what was meant for another
-    heard: int  # packets that at least one robot decoded
-    receptions: int  # times that a robot decoded a packet
 
 
 def age_of_information(
@@ -105,21 +82,6 @@ class TaskCost:
     name: str  # such as "velocity variance"
     unit: str  # such as "m²/s²"
     value: Float[np.ndarray, "B"]
-
-
-PACKET_COUNTS = Packets._fields  # the names of all counts
-
-# `Packets` as one array, whose elements have its fields: nine arrays would take as long to make and
-# to pass to compiled code as all costs of a single mission take to measure.
-COUNTS = np.dtype([(name, np.float64) for name in PACKET_COUNTS])
-
-
-def no_packets(num_missions: int) -> Shaped[np.ndarray, "B"]:
-    """Return the counts of a window of Alg. 1 in which nobody transmits."""
-    counts = np.zeros(num_missions, COUNTS)
-    counts["heard"] = np.nan
-    counts["receptions"] = np.nan
-    return counts
 
 
 class WindowCosts(NamedTuple):
@@ -235,72 +197,9 @@ def _measure(
     first = Phase(recipient=first_recipient, heard=first_heard)
     second = Phase(recipient=second_recipient, heard=second_heard)
     if is_broadcast:
-        _count_broadcasts(first, second, counts)
+        count_broadcasts(first, second, counts)
     else:
-        _count_addressed(first, second, counts)
-
-
-@compiled()
-def _count_addressed(request: Phase, response: Phase, counts: Shaped[np.ndarray, "B"]) -> None:
-    """Fill in the fates of requests and of the responses to them, as in Alg. 1."""
-    for b in range(counts.shape[0]):
-        asked = _count_slot(request.recipient[b], request.heard[b])
-        replied = _count_slot(response.recipient[b], response.heard[b])
-        counts[b].sent = asked.sent
-        counts[b].transmitted = asked.sent + replied.sent
-        counts[b].attempted = asked.sent
-        counts[b].delivered = asked.delivered
-        counts[b].lost = asked.sent - asked.delivered
-        counts[b].overheard = asked.overheard + replied.overheard
-        counts[b].answered = replied.delivered
-        counts[b].heard = np.nan
-        counts[b].receptions = np.nan
-
-
-@compiled()
-def _count_broadcasts(first: Phase, second: Phase, counts: Shaped[np.ndarray, "B"]) -> None:
-    """Fill in the fates of the broadcasts of two slots (IV-C)."""
-    for b in range(counts.shape[0]):
-        one = _count_slot(first.recipient[b], first.heard[b])
-        other = _count_slot(second.recipient[b], second.heard[b])
-        counts[b].sent = one.sent + other.sent
-        counts[b].transmitted = one.sent + other.sent
-        counts[b].attempted = np.nan
-        counts[b].delivered = np.nan
-        counts[b].lost = np.nan
-        counts[b].overheard = np.nan
-        counts[b].answered = np.nan
-        counts[b].heard = one.heard + other.heard
-        counts[b].receptions = one.receptions + other.receptions
-
-
-@compiled()
-def _count_slot(recipient: Int[np.ndarray, "N"], heard: Int[np.ndarray, "N"]) -> SlotCounts:
-    """Count the packets of one slot in one mission."""
-    sent = 0
-    delivered = 0
-    overheard = 0
-    num_heard = 0
-    receptions = 0
-    is_heard = np.zeros(recipient.shape[0], dtype=np.bool_)
-    for i in range(recipient.shape[0]):
-        sent += recipient[i] != i
-        sender = heard[i]
-        if sender == i:
-            continue
-        is_meant = recipient[sender] == i
-        delivered += is_meant
-        overheard += not is_meant
-        num_heard += not is_heard[sender]
-        receptions += 1
-        is_heard[sender] = True
-    return SlotCounts(
-        sent=sent,
-        delivered=delivered,
-        overheard=overheard,
-        heard=num_heard,
-        receptions=receptions,
-    )
+        count_addressed(first, second, counts)
 
 
 @compiled()

@@ -20,7 +20,8 @@ from swarm_mj.system.compiled import compiled
 
 MAX_STDS = 10.0  # more than any error of a position
 BITS_PER_BYTE = 8
-POSITION_BITS, VELOCITY_BITS = 16, 8  # per axis
+POSITION_BITS = 16  # per axis
+VELOCITY_BITS = 8  # per axis
 TIE_BREAK = 1e-9  # rises are halves of a window, so this decides between equal ones only
 AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
 
@@ -142,7 +143,8 @@ def check_fits(
     taken_s: float = 0.0,
 ) -> None:
     """Raise ValueError unless a slot holds a packet; the texts complete the message."""
-    rate, capacity = mission.bit_rate, slot_bytes(mission, taken_s)
+    rate = mission.bit_rate
+    capacity = slot_bytes(mission, taken_s)
     if rate is not None and capacity is not None and packet.num_bytes > capacity:
         left_s = mission.window_s * SLOT_WINDOWS - taken_s
         needed = packet.num_bytes * BITS_PER_BYTE / left_s

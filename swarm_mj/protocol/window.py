@@ -13,13 +13,13 @@ from collections.abc import Callable
 from copy import deepcopy
 from dataclasses import dataclass, replace
 from functools import cache
-from typing import ClassVar, NamedTuple, Protocol
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import BROADCAST, Buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
 from swarm_mj.protocol.packets import entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
@@ -79,10 +79,15 @@ def _oneself(shape: tuple[int, int]) -> Int[np.ndarray, "B N"]:
     return np.broadcast_to(np.arange(shape[1]), shape)
 
 
+# Whom each robot addresses next, given the phases of this window so far.
+Decide = Callable[[tuple[Phase, ...]], Int[np.ndarray, "B N"]]
+Move = Callable[[], RobotStates]  # through one window; returns where the robots then are
+
+
 def window(
     buffers: Buffers,
-    states: RobotStates,
-    recipient: Int[np.ndarray, "B N"],
+    decide: Decide,
+    move: Move,
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
     *,
@@ -90,10 +95,15 @@ def window(
 ) -> tuple[Phase, Phase]:
     """Play one communication window: a transmission phase, then a response phase (Alg. 1).
 
+    There is one difference: Alg. 1 evaluates the policy after the robots' self-observation; here
+    it decides before the robots move, as in the authors' code.
+
     Args:
         buffers: The robots' buffers at t; they are written in place.
-        states: Where the robots truly are, and what they observe of themselves; fixed meanwhile.
-        recipient: Whom each robot addresses, from 0 to N - 1, or `BROADCAST`; itself is silence.
+        decide: The policy, which is asked once: whom each robot addresses, from 0 to N - 1, or
+            `BROADCAST`; itself is silence.
+        move: Moves the robots once, and returns where they truly are, and what they observe of
+            themselves; fixed meanwhile.
         channel: Who decodes whom. Its packets must arrive in the slot in which they were sent; for
             an `AsynchronousChannel` there is `asynchronous_window.window`.
         now: t when the window begins, [B], [windows].
@@ -105,8 +115,10 @@ def window(
     Raises:
         ValueError: If a user's own channel answers what is no robot, or a robot that is silent.
     """
-    # Transmission phase. The robots have decided already, as in the authors' code; see
-    # `RequestResponse`.
+    recipient = decide(())
+    states = move()
+
+    # Transmission phase.
     t = now + SLOT_WINDOWS
     observe_self(buffers, states, t)
     record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
@@ -226,125 +238,3 @@ def channel_at(
         return channel
     slot = np.rint(t * SLOTS_PER_WINDOW).astype(np.int64) - 1
     return channel.at(slot, np.arange(len(t)) if mission is None else mission)
-
-
-class PlayWindow(Protocol):
-    """A way to play a window of Alg. 1 over a channel of its own; arguments as in `window`."""
-
-    def __call__(
-        self,
-        buffers: Buffers,
-        states: RobotStates,
-        recipient: Int[np.ndarray, "B N"],
-        *,
-        now: Float[np.ndarray, "B"],
-        silence_is_attempt: bool,
-    ) -> tuple[Phase, Phase]:
-        """Return the transmission phase and the response phase."""
-        ...
-
-
-class PlayBroadcast(Protocol):
-    """A way to play a slot of broadcasts over a channel of its own; arguments as in `broadcast`."""
-
-    def __call__(
-        self,
-        buffers: Buffers,
-        states: RobotStates,
-        recipient: Int[np.ndarray, "B N"],
-        *,
-        now: Float[np.ndarray, "B"],
-        silence_is_attempt: bool,
-    ) -> Phase:
-        """Return the slot's phase."""
-        ...
-
-
-class Talk(NamedTuple):
-    """How robots talk over one channel: one implementation of windows, which `talk_over` chose."""
-
-    window: PlayWindow
-    broadcast: PlayBroadcast
-
-
-# Whom each robot addresses next, given the phases of this window so far.
-Decide = Callable[[tuple[Phase, ...]], Int[np.ndarray, "B N"]]
-Move = Callable[[], RobotStates]  # through one window; returns where the robots then are
-
-
-@dataclass(frozen=True, kw_only=True)
-class RequestResponse:
-    """A window of Alg. 1: robots that were addressed answer.
-
-    There is one difference: Alg. 1 evaluates the policy after the robots' self-observation; here
-    it decides before the robots move, as in the authors' code.
-    """
-
-    is_broadcast: ClassVar[bool] = False  # whether packets are for everyone who hears them
-    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself
-
-    def __call__(
-        self,
-        buffers: Buffers,
-        decide: Decide,
-        move: Move,
-        talk: Talk,
-        now: Float[np.ndarray, "B"],
-    ) -> tuple[Phase, ...]:
-        """Play one window from t on [windows], and return the phases of its two slots.
-
-        Decisions are trusted; a user's own channel is checked (`checked_decode`).
-        """
-        recipient = decide(())
-        states = move()
-        return talk.window(
-            buffers, states, recipient, now=now, silence_is_attempt=self.silence_is_attempt
-        )
-
-
-@dataclass(frozen=True, kw_only=True)
-class DoubleBroadcast:
-    """A window of two broadcasts that nobody answers, each decided on what is known (IV-C).
-
-    By the authors' half-duplex rule a robot that is addressed hears while it sends, so there a
-    broadcast needs an addressee: the next identity, unless the policy names one.
-    """
-
-    is_broadcast: ClassVar[bool] = True
-    silence_is_attempt: bool = False  # whether a silent robot notes having addressed itself
-    needs_addressees: bool = False  # whether the half-duplex rule is the authors'
-    moves_each_slot: bool = False  # whether robots move before the second broadcast too
-
-    def __call__(
-        self,
-        buffers: Buffers,
-        decide: Decide,
-        move: Move,
-        talk: Talk,
-        now: Float[np.ndarray, "B"],
-    ) -> tuple[Phase, ...]:
-        """Play one window; arguments as in `RequestResponse`."""
-        recipient = self._addressed(decide(()))
-        states = move()
-        first = talk.broadcast(
-            buffers, states, recipient, now=now, silence_is_attempt=self.silence_is_attempt
-        )
-
-        recipient = self._addressed(decide((first,)))
-        if self.moves_each_slot:
-            states = move()
-        t = now + SLOT_WINDOWS
-        second = talk.broadcast(
-            buffers, states, recipient, now=t, silence_is_attempt=self.silence_is_attempt
-        )
-        return first, second
-
-    def _addressed(self, recipient: Int[np.ndarray, "B N"]) -> Int[np.ndarray, "B N"]:
-        """Return the recipients, or addressees where a broadcast needs one."""
-        if not self.needs_addressees:
-            return recipient
-        next_identity = (np.arange(recipient.shape[1]) + 1) % recipient.shape[1]
-        return np.where(recipient == BROADCAST, next_identity, recipient)
-
-
-WindowProtocol = RequestResponse | DoubleBroadcast  # a policy chooses one

@@ -3,11 +3,12 @@
 All robots decide when a slot of the earliest clock begins; each transmits when its own begins. A
 packet takes `AIRTIME` of a slot, and the rest is a guard interval. A packet that has not ended by
 the next decision is late: it counts as decoded in the next slot. Another packet interferes with the
-share of it that both overlap. Index order: `[p, b, i, j]` is robot `i`, which sends in slot `p` of
-three, the last of them now, and `j`, which receives.
+share of it that both overlap. Index order: `[p, b, i, j]` is robot `i`, which sends in slot `p`
+(`BEFORE_LAST`, `LAST` or `NOW`), and `j`, which receives.
 """
 
 from collections.abc import Sequence
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int, UInt64
@@ -19,7 +20,20 @@ from swarm_mj.system.compiled import compiled
 
 AIRTIME = 0.8  # of a slot
 GUARD = 1.0 - AIRTIME
-NUM_SLOTS = 3  # packets overlap those of the slots before and after their own
+# Packets overlap those of the slots before and after their own, so three slots are kept.
+BEFORE_LAST = 0
+LAST = 1
+NOW = 2
+NUM_SLOTS = 3
+
+
+class Arrivals(NamedTuple):
+    """The packets that arrive in one slot, late ones and those that were sent in it."""
+
+    late: Int[np.ndarray, "B N"]  # whom i addressed a slot ago, if that packet comes late
+    heard_late: Int[np.ndarray, "B N"]  # whose late packet j decoded; itself: none
+    punctual: Int[np.ndarray, "B N"]  # whom i addressed now, if that packet comes in time
+    heard_now: Int[np.ndarray, "B N"]  # whose punctual packet j decoded; itself: none
 
 
 class AsynchronousChannel:
@@ -34,9 +48,14 @@ class AsynchronousChannel:
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Start new missions; the clocks are drawn after all else."""
         self._channel.start(num_robots, rngs)
-        drawn = np.stack([rng.random((2, num_robots)) for rng in rngs])
-        self._offset = self._most_offset * drawn[:, 0]
-        self._drift = self._most_drift * (2.0 * drawn[:, 1] - 1.0)
+        shape = (len(rngs), num_robots)
+        offset_share = np.empty(shape)
+        drift_share = np.empty(shape)
+        for b, rng in enumerate(rngs):
+            offset_share[b] = rng.random(num_robots)
+            drift_share[b] = rng.random(num_robots)
+        self._offset = self._most_offset * offset_share
+        self._drift = self._most_drift * (2.0 * drift_share - 1.0)
         self._silence = np.broadcast_to(np.arange(num_robots), self._offset.shape)
         self._lag = np.zeros((NUM_SLOTS, *self._offset.shape))
         self._recipient = np.stack([self._silence] * NUM_SLOTS)
@@ -62,31 +81,30 @@ class AsynchronousChannel:
         mission: Int[np.ndarray, "B"],
     ) -> Int[np.ndarray, "B N"]:
         for kept in (self._lag, self._recipient, self._power_mw):
-            kept[:-1] = kept[1:]
+            kept[BEFORE_LAST] = kept[LAST]
+            kept[LAST] = kept[NOW]
         key = self._channel.key
         rule = self._channel.reception
         is_sender = recipient != self._silence
         mean_mw = self._channel.received_mw(position_m, mission, is_sender)
-        faded_powers(mean_mw, is_sender, slot, key, rule, self._power_mw[-1])
-        self._lag[-1] = self.lag(slot)
-        self._recipient[-1] = recipient
+        faded_powers(mean_mw, is_sender, slot, key, rule, self._power_mw[NOW])
+        self._lag[NOW] = self.lag(slot)
+        self._recipient[NOW] = recipient
         return decode_overlapping(self._lag, self._recipient, self._power_mw, slot, key, rule)
 
-    def split(
-        self, heard: Int[np.ndarray, "B N"]
-    ) -> tuple[tuple[np.ndarray, np.ndarray], tuple[np.ndarray, np.ndarray]]:
-        """Return the recipients and the receptions of the last slot's late packets, and of others.
-
-        All are [B, N]; `heard` is what was decoded in this slot.
-        """
+    def split(self, heard: Int[np.ndarray, "B N"]) -> Arrivals:
+        """Return which of the packets that were `heard` in this slot came late, and which not."""
         is_late = self._lag > GUARD
         silence = self._silence
-        late = np.where(is_late[-2], self._recipient[-2], silence)
-        punctual = np.where(is_late[-1], silence, self._recipient[-1])
+        late = np.where(is_late[LAST], self._recipient[LAST], silence)
+        punctual = np.where(is_late[NOW], silence, self._recipient[NOW])
         came_late = np.take_along_axis(late, heard, axis=1) != heard
-        heard_late = np.where(came_late, heard, silence)
-        heard_now = np.where(came_late, silence, heard)
-        return (late, heard_late), (punctual, heard_now)
+        return Arrivals(
+            late=late,
+            heard_late=np.where(came_late, heard, silence),
+            punctual=punctual,
+            heard_now=np.where(came_late, silence, heard),
+        )
 
 
 @compiled()
@@ -109,10 +127,10 @@ def decode_overlapping(
         for j in range(num_robots):
             heard[b, j] = j
             strongest_mw = 0.0
-            for p in range(1, NUM_SLOTS):
+            for p in (LAST, NOW):
                 for i in range(num_robots):
                     is_late = lag[p, b, i] > GUARD
-                    ends_later = is_late == (p == NUM_SLOTS - 1)
+                    ends_later = is_late == (p == NOW)
                     signal_mw = power_mw[p, b, i, j]
                     if ends_later or signal_mw <= strongest_mw:
                         continue
@@ -121,7 +139,13 @@ def decode_overlapping(
                     if not is_received(over_noise, rule.threshold):
                         continue
                     jam_mw = _interference(
-                        lag[:, b], recipient[:, b], power_mw[:, b], p, i, j, rule
+                        lag=lag[:, b],
+                        recipient=recipient[:, b],
+                        power_mw=power_mw[:, b],
+                        p=p,
+                        i=i,
+                        j=j,
+                        rule=rule,
                     )
                     ratio = sinr(signal_mw, jam_mw, rule.noise_mw)
                     is_clear = is_received(ratio, rule.threshold)

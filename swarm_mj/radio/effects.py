@@ -1,9 +1,9 @@
 """Effects of a channel beyond the paper's free space, from path loss to clocks, each in one place.
 
 An effect says whether a mission has it (`of`), how a title names it, and what it changes of a
-channel's numbers (`change`). The list of all effects, `EFFECTS`, is made from their classes. From
-it follow the channel that a mission flies, its title, what robots may know of it, and the table of
-`docs/channels.md`, whose sentences are the classes' own.
+channel's numbers (`change`). From `EFFECTS`, the list of all, follow the channel that a mission
+flies, its title, what robots may know of it, and the table of `docs/channels.md`, whose sentences
+are the classes' own.
 """
 
 from abc import ABC, abstractmethod
@@ -82,7 +82,8 @@ class PathLoss(
     the direct ray (both: Rappaport 2002).
     """
 
-    # To add a law, name it in `PathLossLaw` and its parameters in `Mission`; here it gets a case.
+    # To add a law, name it in `PathLossLaw` and its parameters in `mission.surroundings`; here it
+    # gets a case.
     breakpoint_m: float  # up to which free space holds
     exponent: float  # n, beyond it: tenfold distance costs 10 n dB
 
@@ -303,8 +304,16 @@ class Obstruction(Effect):
         return model._replace(law=model.law._replace(obstacles=self.obstacles))
 
 
-# In the order of the titles, which is that of the classes above.
-EFFECTS: tuple[type[MissionEffect], ...] = tuple(MissionEffect.__subclasses__())
+# In the order of the titles. A test finds an effect that is left out.
+EFFECTS: tuple[type[MissionEffect], ...] = (
+    PathLoss,
+    Shadowing,
+    Fading,
+    Erasure,
+    Bursts,
+    HighPower,
+    Clocks,
+)
 
 
 def effects_of(mission: Mission) -> list[MissionEffect]:

@@ -4,6 +4,7 @@ What differs from free space is interpolated, in dB: gains rise without limit to
 what walls, ground and antennas make of them changes slowly from place to place.
 """
 
+import io
 from pathlib import Path
 
 import numpy as np
@@ -19,6 +20,8 @@ from swarm_mj.system.reading import open_file
 
 HEADER = "x1_m,y1_m,x2_m,y2_m,gain_db"
 NUM_NEAREST = 8  # pairs of the table that a link is interpolated from
+MOST_DB = 1000.0  # of a gain, up or down; powers of more are infinite
+MOST_M = 1e9  # of a place, from the middle; the squares of more are infinite
 
 
 class GainTable(ComposedChannel):
@@ -42,14 +45,19 @@ class GainTable(ComposedChannel):
         rows = np.empty(0)
         with open_file(path, "table of gains") as file:
             header = file.readline().decode("utf-8-sig").strip()
-            if header == HEADER:
-                rows = np.loadtxt(file, delimiter=",", ndmin=2)
+            content = file.read()
+        if header == HEADER and content.strip():  # NumPy warns of what is empty
+            rows = np.loadtxt(io.BytesIO(content), delimiter=",", ndmin=2)
         if len(rows) < NUM_NEAREST or not np.all(np.isfinite(rows)):
             least = f"{NUM_NEAREST} rows of finite numbers or more, with -150 dB for no link"
             raise ValueError(f"a table of gains has a first line {HEADER}, then {least}")
-        ends_m = rows[:, :4]
-        received_mw = radio.power_mw * from_db(rows[:, 4])
-        apart_m = np.maximum(np.hypot(*(ends_m[:, :2] - ends_m[:, 2:]).T), MIN_DISTANCE_M)
+        from_x_m, from_y_m, to_x_m, to_y_m, gain_db = rows.T
+        ends_m = np.column_stack([from_x_m, from_y_m, to_x_m, to_y_m])
+        _check_largest(ends_m, MOST_M, "m")
+        _check_largest(np.asarray(gain_db), MOST_DB, "dB")
+        received_mw = radio.power_mw * from_db(gain_db)
+        distance_m = np.hypot(from_x_m - to_x_m, from_y_m - to_y_m)
+        apart_m = np.maximum(distance_m, MIN_DISTANCE_M)
         beyond_db = to_db(received_mw * apart_m**2 / radio.received_at_1_m_mw)
         # Every pair in both directions: the same numbers with its ends exchanged.
         self._beyond_db = np.tile(beyond_db, 2)
@@ -70,3 +78,13 @@ class GainTable(ComposedChannel):
             beyond_db = np.sum(weight * self._beyond_db[pair], axis=1) / np.sum(weight, axis=1)
             power_mw[b, i, j] *= from_db(beyond_db)
         return power_mw
+
+
+def _check_largest(numbers: Float[np.ndarray, "..."], most: float, unit: str) -> None:
+    """Raise ValueError for numbers that no link has."""
+    largest = np.abs(numbers).max()
+    if largest > most:
+        raise ValueError(
+            f"a table of gains has numbers from {-most:g} to {most:g} {unit}, not {largest:g}; "
+            "-150 dB is no link"
+        )

@@ -197,7 +197,8 @@ def _with_chances(links: Links, reception: Reception | None, std_db: float) -> L
 @cache
 def _curves(reception: Reception, *, is_certain: bool) -> Curves:
     """Return the curves of these statistics; `KNOWN` if packets decode for certain, or never."""
-    begin, end = reception.burst_begin, reception.burst_end
+    begin = reception.burst_begin
+    end = reception.burst_end
     mean_loss = begin / (begin + end) if begin > 0.0 else 0.0  # share of slots in bursts
     success = (1.0 - reception.erasure) * (1.0 - mean_loss)
     if is_certain and reception.rician_k == NO_FADING and success == 1.0:

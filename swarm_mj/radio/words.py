@@ -1,7 +1,7 @@
 """The radio in words: what titles and tables say of a mission's channel."""
 
 from swarm_mj.mission import PRESETS, WORLDS, Mission
-from swarm_mj.mission.specification import NOTHING
+from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.system.fields import as_typed
 

@@ -12,10 +12,13 @@ import rerun.blueprint as rrb
 from rerun.encodings import EntityPathLike
 
 from swarm_mj.replay import layers, palette
-from swarm_mj.replay.charts import STATES_SIZE, TREE_SIZE, Plot, plots
+from swarm_mj.replay.charts import STATES_SIZE, TREE_SIZE
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.layers import Arrows, LegendSample, Lines, Lines3D, Points, Rings, legend
-from swarm_mj.replay.recorder import Log, in_matrix
+from swarm_mj.replay.layer_kinds import Arrows, Lines, Lines3D, Points, Rings, of_others
+from swarm_mj.replay.layers import LegendSample, legend
+from swarm_mj.replay.log import Log
+from swarm_mj.replay.plots import Plot, plots
+from swarm_mj.replay.replay_size import in_matrix
 from swarm_mj.replay.rerun_log import TIMELINE, RerunLog
 from swarm_mj.replay.stage import square_m
 
@@ -118,7 +121,7 @@ def _without_others(links: Iterable[Lines | Lines3D]) -> Overrides:
     """Hide the links between others than the observer; the viewer can show them."""
     hidden: Overrides = {}
     for layer in links:
-        hidden[f"/{layers.of_others(layer).path}"] = rrb.EntityBehavior(visible=False)
+        hidden[f"/{of_others(layer).path}"] = rrb.EntityBehavior(visible=False)
     return hidden
 
 

@@ -29,10 +29,12 @@ WAY_SHARE = 0.005  # of the area's side, that robots may fly between snapshots
 # Pieces that a line is drawn in, from where to where [of its length]: the dashes of a link that is
 # too weak cover DASH of the way to the next one's start.
 WHOLE = np.array([[0.0, 1.0]])
-NUM_DASHES, DASH = 4, 0.6
+NUM_DASHES = 4
+DASH = 0.6
 DASHES = (np.arange(NUM_DASHES)[:, None] + [0.0, DASH]) / (NUM_DASHES - 1 + DASH)
 PIECES: dict[LinkKind, Float[np.ndarray, "_ 2"]] = {"unbelieved": WHOLE, "too_weak": DASHES}
-FAINTEST, FAINTEST_DB = 0.5, -30.0  # the shade of a link that misses this margin or more
+FAINTEST = 0.5  # the shade of a link that misses `FAINTEST_DB` or more
+FAINTEST_DB = -30.0
 BRIGHTEST = 0.85  # of one that is hardly too weak
 
 # A link that is believed in but too weak to decode, or decodes although policies do not believe in

@@ -16,7 +16,7 @@ from rerun.chunk import RrdReader
 
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.footage import Facts, Footage, shown_ground
-from swarm_mj.replay.layers import Entity, Lines3D
+from swarm_mj.replay.layer_kinds import Entity, Lines3D, of_others
 from swarm_mj.replay.links import (
     LINK,
     NO_MISMATCH,
@@ -51,7 +51,8 @@ def with_digest(recorded: bytes) -> bytes:
 
 def _seal(recorded: memoryview) -> bytes:
     field = FIELD + hashlib.sha256(recorded).digest()
-    header, footer = recorded[:HEADER_BYTES], recorded[-FOOTER_BYTES:]
+    header = recorded[:HEADER_BYTES]
+    footer = recorded[-FOOTER_BYTES:]
     return b"".join([header, END, len(field).to_bytes(8, "little"), field, footer])
 
 
@@ -151,7 +152,7 @@ def _mismatch(columns: Columns) -> LinkMismatch:
     window = NO_MISMATCH.window
     found = [NO_MISMATCH.links]
     for kind, layer in layers.SCENE_LINKS.items():
-        for entity in (layer, layers.of_others(layer)):
+        for entity in (layer, of_others(layer)):
             if (entity.path, "margin_db") in columns:
                 window = _windows(columns, entity)
                 found.append(_links(columns, entity, kind))

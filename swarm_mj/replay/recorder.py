@@ -2,92 +2,24 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from numbers import Integral
 from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.mission import Mission
-from swarm_mj.protocol.buffers import NEVER, NO_PARENT
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
 from swarm_mj.replay.footage import Facts, Footage, frame, shown_ground
+from swarm_mj.replay.log import Log
 from swarm_mj.replay.palette import nice_scale
+from swarm_mj.replay.replay_size import AGE_BYTES, MAX_AGE_MATRIX_BYTES, in_matrix
 from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
-from swarm_mj.system.needs import GB
-
-# Longer or larger flights keep the age matrix of every k-th window only.
-MAX_AGE_MATRIX_BYTES = 64e6
-AGE_BYTES = 4  # float32
-MAX_MATRIX_ROBOTS = 1000  # of larger teams, the matrix has every k-th robot
-
-
-def in_matrix(num_robots: int) -> range:
-    """Return the robots that the age matrix shows of a team."""
-    return range(0, num_robots, -(-num_robots // MAX_MATRIX_ROBOTS))
-
-
-class ReplaySize(NamedTuple):
-    """A fit of the bytes that replays take, in memory or on disk."""
-
-    base: float  # rerun itself, or the layout
-    window: float
-    robot: float  # in each window
-    matrix: float  # of each byte of the age matrices
-
-    def of(self, mission: Mission, num_windows: int) -> float:
-        """Return the size of the replay of so long a flight [bytes]."""
-        num_robots = mission.num_robots
-        matrix = AGE_BYTES * len(in_matrix(num_robots)) ** 2
-        matrices = min(MAX_AGE_MATRIX_BYTES, num_windows * matrix)
-        a_window = self.window + self.robot * num_robots
-        return self.base + a_window * num_windows + self.matrix * matrices
-
-
-# Of measured peaks, when a replay is written, and of files of teams that move; others' are smaller.
-# The age matrices are copied in memory and compressed in the file.
-IN_MEMORY = ReplaySize(base=0.16 * GB, window=15e3, robot=750.0, matrix=3.3)
-ON_DISK = ReplaySize(base=0.5e6, window=800.0, robot=110.0, matrix=0.04)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Log(Footage):
-    """Footage and all else that a replay shows of a flight, as it was recorded."""
-
-    recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
-    heard: Int[np.ndarray, "T 2 N"]  # the sender that robot j decoded in both phases; itself: none
-    believed_m: Float[np.ndarray, "T N 2"]  # M: where j was, as the ego robot knows it [m]
-    parent: Int[np.ndarray, "T N"]  # P^{ego,j}
-    ego_age: Float[np.ndarray, "T N"]  # t - T^{ego,j}, also of those never heard of [windows]
-    age_window: Int[np.ndarray, "K"]  # the windows of the age matrix, every stride-th
-    age: Float[np.ndarray, "K M M"]  # t - T^{i,j} of the robots `in_matrix` [windows]
-    age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
-    age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
-    velocity_variance_m2ps2: Float[np.ndarray, "T"]
-    task_cost: TaskCost | None = None  # one value a window; None if the controller has none
-    num_believed: Int[np.ndarray, "C"]  # links that policies believe in, in each snapshot
-    num_working: Int[np.ndarray, "C"]  # links whose packets decode but for fades, likewise
-
-    @property
-    def is_transmitter(self) -> Bool[np.ndarray, "T N"]:
-        """True if a robot sent a request, or a broadcast in either phase."""
-        num_phases = 2 if self.facts.is_broadcast else 1
-        return np.any(links.is_other(self.recipient)[:, :num_phases], axis=1)
-
-    @property
-    def is_other_known(self) -> Bool[np.ndarray, "T N"]:
-        """True if the ego robot has heard of j, which is not itself."""
-        return ~np.isnan(self.known_age) & (np.arange(self.known_age.shape[1]) != self.ego)
-
-    @property
-    def has_parent(self) -> Bool[np.ndarray, "T N"]:
-        """True if the ego robot's entry of j came over the radio."""
-        return self.is_other_known & (self.parent != NO_PARENT)
 
 
 def check_observer(observer: int, num_robots: int) -> None:
@@ -98,7 +30,10 @@ def check_observer(observer: int, num_robots: int) -> None:
 
 
 class _Row(NamedTuple):
-    """A mission's window as it is recorded, or, of all windows, arrays with their axis first."""
+    """A mission's window as it is recorded, or, of all windows, arrays with their axis first.
+
+    Each is a field of `Log`, of the same name.
+    """
 
     position_m: Float[np.ndarray, "*T N 2"]
     velocity_mps: Float[np.ndarray, "*T N 2"]
@@ -124,7 +59,7 @@ def _stacked(rows: Sequence[_Row]) -> _Row:
 
 
 class _Compared(NamedTuple):
-    """The part from snapshots of the radio, of which free space has none."""
+    """The fields of `Log` that are from snapshots of the radio, of which free space has none."""
 
     is_cut_off: Bool[np.ndarray, "T N"]
     mismatch: links.LinkMismatch
@@ -240,29 +175,14 @@ class Recorder:
         return Log(
             facts=facts,
             window=window,
-            position_m=flown.position_m,
-            velocity_mps=flown.velocity_mps,
-            is_on=flown.is_on,
-            known_age=flown.known_age,
-            is_cut_off=compared.is_cut_off,
-            age_mean=flown.age_mean,
             packets=packets,
-            mismatch=compared.mismatch,
             ground=shown_ground(flown.position_m, facts.mission),
             scene=self._swarm.scene,
-            recipient=flown.recipient,
-            heard=flown.heard,
-            believed_m=flown.believed_m,
-            parent=flown.parent,
-            ego_age=flown.ego_age,
             age_window=age_window,
             age=age,
-            age_std=flown.age_std,
-            age_max=flown.age_max,
-            velocity_variance_m2ps2=flown.velocity_variance_m2ps2,
             task_cost=replace(costs[0], value=value) if costs else None,
-            num_believed=compared.num_believed,
-            num_working=compared.num_working,
+            **flown._asdict(),
+            **compared._asdict(),
         )
 
     def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K M M"]) -> Facts:

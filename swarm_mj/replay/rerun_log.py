@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
-from swarm_mj.replay.layers import (
+from swarm_mj.replay.layer_kinds import (
     Arrows,
     Colours,
     Entity,
@@ -22,8 +22,8 @@ from swarm_mj.replay.layers import (
 )
 from swarm_mj.replay.links import LinkRows, shades
 from swarm_mj.replay.links import Points as Places
+from swarm_mj.replay.log import Log
 from swarm_mj.replay.palette import LinkKind
-from swarm_mj.replay.recorder import Log
 
 TIMELINE = "window"
 CROWD = 400  # robots from which on they are drawn smaller, so that they do not cover each other

@@ -12,7 +12,7 @@ from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.arenas import loss_db_of, obstacle_geoms, obstacles_of
+from swarm_mj.physics.obstacles import loss_db_of, obstacle_geoms, obstacles_of
 from swarm_mj.physics.outlines import footprints
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import CAPSULE, CYLINDER, ELLIPSOID, ROBOT_HEIGHT_M, SPHERE
@@ -112,8 +112,9 @@ def filling(
     outline_m: Float[np.ndarray, "K 2"], apart_m: float
 ) -> list[tuple[tuple[float, float], tuple[float, float]]]:
     """Return lines from west to east, so far apart, that fill an outline [m]."""
-    y_low = np.min(outline_m[:, 1])
-    y_high = np.max(outline_m[:, 1])
+    _, y_m = outline_m.T
+    y_low = np.min(y_m)
+    y_high = np.max(y_m)
     num = max(1, int(np.ceil((y_high - y_low) / apart_m)))
     lines = []
     for y in y_low + (np.arange(num) + 0.5) * (y_high - y_low) / num:
@@ -153,13 +154,10 @@ def _drawn(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.AsCo
     kind = model.geom_type[g]
     size_m = model.geom_size[g]
     place_m = data.geom_xpos[g]
-    rotation = data.geom_xmat[g].reshape(3, 3)  # its third column is the geom's own upward axis
-    upward = rotation[:, 2]
-    # The box around it, in the geom's own axes: a mesh's need not be centred on its place.
-    middle_m, half_m = np.split(model.geom_aabb[g], 2)
     turns = [_quaternion(data, g)]
     colours = [_colour(model, g)]
     if kind in (SPHERE, ELLIPSOID):
+        _, half_m = np.split(model.geom_aabb[g], 2)
         return rr.Ellipsoids3D(
             half_sizes=[half_m],
             centers=[place_m],
@@ -183,24 +181,39 @@ def _drawn(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.AsCo
         return rr.Capsules3D(
             radii=[radius_m],
             lengths=[2.0 * half_length_m],
-            translations=[place_m - half_length_m * upward],
+            translations=[place_m - half_length_m * _upward(data, g)],
             quaternions=turns,
             colors=colours,
             fill_mode=fill_mode,
         )
+    return _box_around(model, data, g, fill_mode)
+
+
+def _box_around(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.Boxes3D:
+    """Return the box around a geom; of a plane, a plate whose upper face it is."""
+    place_m = data.geom_xpos[g]
+    rotation = data.geom_xmat[g].reshape(3, 3)
+    # In the geom's own axes: a mesh's box need not be centred on its place.
+    middle_m, half_m = np.split(model.geom_aabb[g], 2)
     centre_m = place_m + rotation @ middle_m
-    if kind == PLANE:  # a plate whose upper face is the plane
-        half_x_m, half_y_m, _ = size_m
+    if model.geom_type[g] == PLANE:
+        half_x_m, half_y_m, _ = model.geom_size[g]
         # A size of 0 means without end.
         half_m = np.array([half_x_m or FAR_M, half_y_m or FAR_M, FLOOR_M])
-        centre_m = place_m - FLOOR_M * upward
+        centre_m = place_m - FLOOR_M * _upward(data, g)
     return rr.Boxes3D(
         half_sizes=[half_m],
         centers=[centre_m],
-        quaternions=turns,
-        colors=colours,
+        quaternions=[_quaternion(data, g)],
+        colors=[_colour(model, g)],
         fill_mode=fill_mode,
     )
+
+
+def _upward(data: MjData, g: int) -> np.ndarray:
+    """Return a geom's own upward axis in the world: the third column of its rotation."""
+    _, _, upward = data.geom_xmat[g].reshape(3, 3).T
+    return upward
 
 
 def _quaternion(data: MjData, g: int) -> rr.Quaternion:

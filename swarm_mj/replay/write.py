@@ -2,6 +2,7 @@
 
 import json
 import re
+import warnings
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
@@ -13,9 +14,9 @@ import rerun_bindings as bindings
 
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second
-from swarm_mj.replay import charts, layers, palette
-from swarm_mj.replay.footage import frame
-from swarm_mj.replay.layers import Lines, Lines3D
+from swarm_mj.replay import charts, layers, palette, plots
+from swarm_mj.replay.footage import Ground, frame
+from swarm_mj.replay.layer_kinds import Lines, Lines3D, of_others
 from swarm_mj.replay.layout import draw_legend, layout
 from swarm_mj.replay.links import (
     PIECES,
@@ -27,9 +28,9 @@ from swarm_mj.replay.links import (
     is_other,
     lifted,
 )
+from swarm_mj.replay.log import Log
 from swarm_mj.replay.palette import LinkKind
 from swarm_mj.replay.read import FACTS, with_digest
-from swarm_mj.replay.recorder import Log
 from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import draw_stage
 from swarm_mj.system.writing import write_bytes
@@ -59,10 +60,7 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
     ground = frame(log.position_m, log.facts.mission.half_side_m)
     with rr.RecordingStream(_application(log), send_properties=False) as recording:
         stream = recording.binary_stream()
-        laid_out = layout(log, ground)
-        # Active, for rerun's page in a browser ignores one that is a default only.
-        recording.send_blueprint(laid_out, make_active=True)
-        laid_out.close()
+        _send_layout(recording, log, ground)
         recording.set_log_tick_enabled(False)
         recording.set_log_time_enabled(False)
         recording.send_recording_name(name)
@@ -76,10 +74,23 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
         charts.draw_tree(out)
         charts.draw_age_matrix(out)
         charts.draw_states(out)
-        charts.draw_plots(out)
+        plots.draw_plots(out)
         about = "\n".join([f"# {name}", *_about(log, config)])
         out.fixed(layers.ABOUT, rr.TextDocument(about, media_type="text/markdown"))
     return stream.read() or b""
+
+
+def _send_layout(recording: rr.RecordingStream, log: Log, ground: Ground) -> None:
+    """Send the layout; without one, rerun makes its own."""
+    try:
+        laid_out = layout(log, ground)
+    except (AttributeError, TypeError) as error:  # rerun calls its views unstable
+        lack = f"rerun-sdk {rr.__version__} does not know a part of the layout ({error})"
+        warnings.warn(f"{lack}, so the replay has rerun's own", stacklevel=2)
+        return
+    # Active, for rerun's page in a browser ignores one that is a default only.
+    recording.send_blueprint(laid_out, make_active=True)
+    laid_out.close()
 
 
 def _application(log: Log) -> str:
@@ -230,8 +241,8 @@ def _draw_mismatch(out: RerunLog, height_m: float) -> None:
     for kind, those in by_kind(links[is_own]).items():
         _draw_links(out, kind, those, layers.LINKS[kind], layers.SCENE_LINKS[kind], height_m)
     for kind, those in by_kind(links[~is_own]).items():
-        on_map = layers.of_others(layers.LINKS[kind])
-        in_scene = layers.of_others(layers.SCENE_LINKS[kind])
+        on_map = of_others(layers.LINKS[kind])
+        in_scene = of_others(layers.SCENE_LINKS[kind])
         _draw_links(out, kind, those, on_map, in_scene, height_m)
 
 

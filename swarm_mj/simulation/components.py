@@ -10,10 +10,12 @@ from typing import Any
 from swarm_mj.mission import Mission
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.gain_table import GainTable
-from swarm_mj.system.fields import check_callable, name_of, setting
+from swarm_mj.system.arguments import check_callable, name_of
+from swarm_mj.system.fields import setting
 from swarm_mj.system.user_code import call, file_of, files_named, make
 
-GROUP, SHOWN_AS = "your own parts, each by module:Name", "MODULE:NAME"
+GROUP = "your own parts, each by module:Name"
+SHOWN_AS = "MODULE:NAME"
 OWN = {"group": GROUP, "metavar": SHOWN_AS, "convert": str}
 CALLED_WITH = {  # the kinds of components, and the arguments of each
     "channel": ("position_m", "recipient"),
@@ -96,7 +98,10 @@ class Components:
                     f"{beyond_free_space(mission)} would change nothing; leave out one of them"
                 )
             try:
-                made = replace(made, **{kind: _made(kind, name, mission)})
+                part = _made(kind, name, mission)
+                if part is None or isinstance(part, str):  # which else stand for what is not made
+                    check_callable(kind, part, CALLED_WITH[kind])
+                made = replace(made, **{kind: part})
             except TypeError as error:
                 raise ValueError(f"{kind} {name}: {error}") from error
         return made

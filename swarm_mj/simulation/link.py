@@ -3,17 +3,18 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
-from swarm_mj.mission.specification import OPEN
+from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.protocol.buffers import BROADCAST
-from swarm_mj.protocol.checks import check_robots
+from swarm_mj.protocol.checks import as_array, checked_robots
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import channel_at
 from swarm_mj.radio.mission_radio import mission_radio
+from swarm_mj.system.arguments import check_kind
 
 
 class Link:
@@ -25,6 +26,7 @@ class Link:
 
     Raises:
         ValueError: Without seeds, or if the mission has obstacles.
+        TypeError: For what is no mission.
 
     Example:
         Robot 0 tells the two others, 100 m and 1 km away, something:
@@ -36,6 +38,7 @@ class Link:
 
     def __init__(self, mission: Mission, seeds: Sequence[int] = (1,)) -> None:
         """Start all missions."""
+        check_kind("mission", mission, Mission, 'paper("stationary")')
         check_seeds(seeds)
         if mission.arena != OPEN:
             raise ValueError(f"a Link has no obstacles: arena must be open, not {mission.arena}")
@@ -59,19 +62,26 @@ class Link:
             The sender that each robot decodes, [B, N], or itself: nobody.
 
         Raises:
-            ValueError: For arrays of another shape, places that are not finite, or addressees that
-                are no robots.
+            ValueError: For arrays of another shape or kind, places that are not finite, or
+                addressees that are no robots.
         """
-        sends = np.asarray(wants_to_send)
-        place_m = np.array(position_m, dtype=np.float64)
-        if sends.dtype == np.bool_:
-            sends = np.where(sends, BROADCAST, np.arange(sends.shape[-1]))
-        check_robots("wants_to_send", np.atleast_2d(sends), self._shape, may_broadcast=True)
-        due = (*sends.shape, 2)
-        if place_m.shape != due or not np.all(np.isfinite(place_m)):
-            raise ValueError(f"position_m must be finite, of shape {due}, not {place_m.shape}")
+        sends = as_array("wants_to_send", wants_to_send)
+        rows = np.atleast_2d(sends)
+        if rows.dtype == np.bool_ and rows.shape == self._shape:
+            rows = np.where(rows, BROADCAST, np.arange(self._shape[1]))
+        recipient = checked_robots("wants_to_send", rows, self._shape, may_broadcast=True)
+        place_m = _checked_places(position_m, due=(*sends.shape, 2))
         self._now += SLOT_WINDOWS
         channel = channel_at(self._channel, self._now)
-        recipient = np.atleast_2d(sends).astype(np.int64)
         heard = channel(place_m.reshape(*self._shape, 2), recipient)
         return heard.reshape(sends.shape)
+
+
+def _checked_places(position_m: ArrayLike, due: tuple[int, ...]) -> Float[np.ndarray, "*B N 2"]:
+    """Return the places as floats of their own; raise ValueError unless they are finite [m]."""
+    given = as_array("position_m", position_m)
+    if given.dtype.kind not in "fiu":  # NumPy would make numbers of dates, truths and texts, too
+        raise ValueError(f"position_m must be numbers [m], not {given.dtype}; convert them")
+    if given.shape != due or not np.all(np.isfinite(given)):
+        raise ValueError(f"position_m must be finite, of shape {due}, not {given.shape}")
+    return np.array(given, dtype=np.float64)

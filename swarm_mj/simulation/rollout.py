@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.costs import Packets, TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.costs import TaskCost, WindowCosts, mean_hops
+from swarm_mj.protocol.packet_counts import Packets
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.fields import check_kind
+from swarm_mj.system.arguments import check_kind
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -94,8 +95,12 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
 
     Raises:
         ValueError: If no window was flown.
+        TypeError: If they are no windows.
     """
+    check_kind("flown", flown, Iterable, "rollout(swarm, policy)")
     flown = list(flown)
+    for window in flown:
+        check_kind("each window", window, WindowRecord, "those of rollout(swarm, policy)")
     if not flown:
         raise ValueError("a summary needs at least 1 window flown, not 0")
     variance = [window.costs.velocity_variance_m2ps2 for window in flown]

@@ -11,35 +11,30 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.control.motion import Controller, controller_of, costed, initial_velocity
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
-from swarm_mj.mission.placement import connected_positions, draw_survivors
+from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.physics.scene import Scene
-from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.carrier_sense import SensingPolicy
-from swarm_mj.policies.policy import (
-    CentralisedPolicy,
-    DecentralisedPolicy,
-    Policy,
-    check_parameters,
-)
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
-from swarm_mj.protocol.checks import check_robots
+from swarm_mj.protocol.checks import checked_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
-from swarm_mj.protocol.packets import Packet, fitting, packet_of, with_room
+from swarm_mj.protocol.packets import fitting, packet_of, with_room
 from swarm_mj.protocol.talk import talk_over
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import LocalViews, Phase, RequestResponse, WindowProtocol
+from swarm_mj.protocol.window import LocalViews, Phase
+from swarm_mj.protocol.window_protocols import RequestResponse, WindowProtocol
 from swarm_mj.radio.carrier_sensing import CarrierSensing, Contention
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
-from swarm_mj.radio.obstruction import blocked
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.localisation import Localisation
-from swarm_mj.system.fields import check_kind, name_of
+from swarm_mj.simulation.starts import Starts, packet_by
+from swarm_mj.system.arguments import check_kind
 from swarm_mj.system.user_code import is_ours
 
 MAX_THREADS = 1024
-MAX_DRAWN_AT_ONCE = 1000  # robots of a team that is drawn anew as a whole until it is connected
 
 
 class Swarm:
@@ -143,8 +138,10 @@ class Swarm:
 
     def _place_robots(self) -> None:
         """Draw where the robots begin, how fast, who will fail, and errors of localisation."""
-        mission, rngs = self.mission, self._rngs
-        position_m = [self._place(b, rng) for b, rng in enumerate(rngs.placement)]
+        mission = self.mission
+        rngs = self._rngs
+        starts = Starts(mission, self._physics.obstacles, self.truth.channel)
+        position_m = [starts.positions(b, rng) for b, rng in enumerate(rngs.placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._survivors = draw_survivors(mission, rngs.failures)
@@ -173,33 +170,6 @@ class Swarm:
         """Let packets hold this many entries at most, and choose how robots talk by that."""
         self.buffers = with_room(self.buffers, num_entries)
         self.talk = talk_over(self.channel, self.buffers)
-
-    def _place(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-        """Draw where mission b's robots begin, connected under their channel where it can say."""
-        mission = self.mission
-        composed = self.truth.channel
-        has_obstacles = self._physics.obstacles is not None
-        return connected_positions(
-            num_robots=mission.num_robots,
-            half_side_m=mission.half_side_m,
-            range_m=mission.range_m,
-            rng=rng,
-            largest_part_at=partial(composed.largest_part, mission=b) if composed else None,
-            is_blocked_at=self._is_blocked if has_obstacles or mission.collide else None,
-            keeps_largest=has_obstacles or mission.num_robots > MAX_DRAWN_AT_ONCE,
-        )
-
-    def _is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
-        """Return which robots would touch an obstacle there, or another robot if they collide."""
-        is_blocked = np.zeros(len(position_m), dtype=bool)
-        obstacles = self._physics.obstacles
-        if obstacles is not None:
-            is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, obstacles)
-        if self.mission.collide:
-            apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
-            overlaps = np.tril(apart_m < 2.0 * ROBOT_RADIUS_M, k=-1)  # the first one may stay
-            is_blocked |= np.any(overlaps, axis=1)
-        return is_blocked
 
     @property
     def states(self) -> RobotStates:
@@ -232,13 +202,7 @@ class Swarm:
             ValueError: If its packets never fit into a slot.
             TypeError: If it is no policy.
         """
-        check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
-        check_parameters(policy)
-        packet = policy.packet(self.mission)
-        if not isinstance(packet, Packet):
-            raise ValueError(
-                f"packet() of {name_of(policy)} must return a Packet, not {packet!r:.80}"
-            )
+        packet = packet_by(policy, self.mission)
         # A policy's type says what it may know: a centre the truth, robots what they believe.
         if isinstance(policy, CentralisedPolicy):
             policy.inform(self.truth)
@@ -362,14 +326,14 @@ class Swarm:
         decide: Callable[[], Int[np.ndarray, "B N"]],
         start: Float[np.ndarray, "B"],
         phases: tuple[Phase, ...],
-    ) -> np.ndarray:
+    ) -> Int[np.ndarray, "B N"]:
         """Return the recipients in the slot after these."""
         if phases:  # a later slot is decided by its own clock, and knows the earlier one
             self.phases = phases
             self.now = start + len(phases) * SLOT_WINDOWS
-        recipient = np.asarray(decide())
-        check_robots("recipient", recipient, self.buffers.shape, may_broadcast=self.is_broadcast)
-        return recipient
+        return checked_robots(
+            "recipient", decide(), self.buffers.shape, may_broadcast=self.is_broadcast
+        )
 
     def task_cost(self) -> TaskCost | None:
         """Return what the task costs now, where the controller has a cost.

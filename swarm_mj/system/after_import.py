@@ -16,6 +16,8 @@ def after_import(library: str, action: Callable[[], object]) -> None:
         sys.meta_path.insert(0, _Waiting(library, action))
 
 
+# Gymnasium 1.4 reads no entry points of other packages, and to import it for its registry would
+# take most of a second of everyone who does without. Hence this hook.
 class _Waiting(MetaPathFinder):
     """Is asked for each module that Python imports, and is gone when the library has come."""
 

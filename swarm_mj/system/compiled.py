@@ -143,7 +143,8 @@ class _Count(Listener):
     """Says how many functions are compiled, as numba says when it begins with one."""
 
     def __init__(self, say: Callable[[str], object]) -> None:
-        self._say, self._number = say, 0
+        self._say = say
+        self._number = 0
 
     def on_start(self, event: Event) -> None:  # noqa: ARG002 - numba's
         self._number += 1
@@ -160,7 +161,8 @@ def compiling(say: Callable[[str], object]) -> AbstractContextManager[None]:
 
 def sources_digest(file: Path) -> str:
     """Return a hash of a file and all that it imports, directly or not, of its package and ours."""
-    found, waiting = set(), [file]
+    found: set[Path] = set()
+    waiting = [file]
     while waiting:
         path = waiting.pop()
         if path not in found:

@@ -4,17 +4,17 @@ A dataclass of such fields is the settings, their documentation and, in `cli.opt
 line at once.
 """
 
-import inspect
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, is_dataclass, replace
-from difflib import get_close_matches
 from functools import cache, partial
 from numbers import Integral, Real
 from pathlib import Path
 from types import MappingProxyType, NoneType
-from typing import Any, Literal, TypeVar, cast, get_args, get_origin
+from typing import Any, Literal, TypedDict, TypeVar, Unpack, cast, get_args, get_origin
 
 import numpy as np
+
+from swarm_mj.system.arguments import check_choice
 
 Value = TypeVar("Value")
 
@@ -26,7 +26,6 @@ KINDS: dict[Any, tuple[type, str]] = {
 }
 # Until when former names and options that are ignored still work, for help and documentation.
 GONE_IN = "version 2.0, not before 2027-12-01"
-NO_NAMES: Mapping[str, str] = MappingProxyType({})
 REQUIRED: Any = MISSING  # the default of a field whose value must be given
 ABOUT = "about"  # the one key of a field's metadata
 
@@ -51,26 +50,29 @@ class Switch:
 
 @dataclass(frozen=True, kw_only=True)
 class Meaning:
-    """The meaning of a field, as `setting` explains it."""
+    """The meaning of a field: what messages, help, documentation and checks say of it.
 
-    help: str = ""
-    label: str = ""
-    unit: str = ""
-    source: str = ""
-    low: float | int | None = None
-    high: float | int | None = None
-    choices: tuple[str, ...] = ()
-    is_joined: bool = False
-    counts_with: Switch | None = None
-    former: tuple[str, ...] = ()
-    group: str = ""
-    metavar: str = ""
-    shown: str | None = None
-    flag: str = ""
-    convert: Callable[[str], object] | None = None
-    reads: Callable[[Any], Iterable[Path]] | None = None
-    is_positional: bool = False
-    is_common: bool = False
+    Raises TypeError for a range that has one end only.
+    """
+
+    help: str = ""  # on the command line; without it, the field is no option
+    label: str = ""  # its name in words, for messages; its name in Python unless given
+    unit: str = ""  # of its number, as it is printed in brackets
+    source: str = ""  # where the default comes from, such as an equation of the paper
+    low: float | int | None = None  # the least number that is allowed
+    high: float | int | None = None  # the largest; both ends are given, or none
+    choices: Collection[str] = ()  # the texts that are allowed, if not all are
+    is_joined: bool = False  # whether several choices may be joined by commas
+    counts_with: Switch | None = None  # what must be on for this to count: see `above_zero`
+    former: tuple[str, ...] = ()  # its names in earlier releases, in files and on command lines
+    group: str = ""  # the heading that it stands under in the help
+    metavar: str = ""  # what stands for its value in the help
+    shown: str | None = None  # what the help says in place of the default; "" is nothing
+    flag: str = ""  # its option, if that is not made from its name
+    convert: Callable[[str], object] | None = None  # makes the value of what was typed
+    reads: Callable[[Any], Iterable[Path]] | None = None  # files to read that a value names
+    is_positional: bool = False  # whether the option has no flag
+    is_common: bool = False  # whether `--help` shows it, and does not leave it to `--help-all`
 
     def __post_init__(self) -> None:
         if (self.low is None) != (self.high is None):
@@ -82,75 +84,40 @@ class Meaning:
         return self.low is not None
 
 
-def setting(
-    default: Value = REQUIRED,
-    help: str = "",
-    *,
-    label: str = "",
-    unit: str = "",
-    source: str = "",
-    low: float | int | None = None,
-    high: float | int | None = None,
-    choices: Collection[str] = (),
-    is_joined: bool = False,
-    counts_with: Switch | None = None,
-    former: tuple[str, ...] = (),
-    group: str = "",
-    metavar: str = "",
-    shown: str | None = None,
-    flag: str = "",
-    convert: Callable[[str], object] | None = None,
-    reads: Callable[[Any], Iterable[Path]] | None = None,
-    is_positional: bool = False,
-    is_common: bool = False,
-) -> Value:
+class MeaningFields(TypedDict, total=False):
+    """The fields of `Meaning` but for the help, as type checkers read them; a test compares."""
+
+    label: str
+    unit: str
+    source: str
+    low: float | int | None
+    high: float | int | None
+    choices: Collection[str]
+    is_joined: bool
+    counts_with: Switch | None
+    former: tuple[str, ...]
+    group: str
+    metavar: str
+    shown: str | None
+    flag: str
+    convert: Callable[[str], object] | None
+    reads: Callable[[Any], Iterable[Path]] | None
+    is_positional: bool
+    is_common: bool
+
+
+def setting(default: Value = REQUIRED, help: str = "", **meaning: Unpack[MeaningFields]) -> Value:
     """Return a dataclass's field that says what it means; type checkers take it for its default.
 
     Args:
         default: Its value unless given; without a default, it must be given.
         help: What it means on the command line; without it, the field is no option.
-        label: Its name in words, for messages; its name in Python unless given.
-        unit: Of its number, as it is printed in brackets.
-        source: Where the default comes from, such as an equation of the paper.
-        low: The least number that is allowed.
-        high: The largest number that is allowed; both ends are given, or none.
-        choices: The texts that are allowed, if not all are.
-        is_joined: Whether several choices may be joined by commas.
-        counts_with: Another field that must be on for this one to count: see `above_zero`.
-        former: Its names in earlier releases: stored files and command lines may have those.
-        group: The heading that it stands under in the help.
-        metavar: What stands for its value in the help.
-        shown: What the help says in place of the default; "" is nothing.
-        flag: Its option, if that is not made from its name.
-        convert: Makes the value of what was typed.
-        reads: Returns the files that a value names to be read, which no output may replace.
-        is_positional: Whether the option has no flag.
-        is_common: Whether `--help` shows it, and does not leave it to `--help-all`.
+        **meaning: What else there is to say of it: see `Meaning`.
 
     Raises:
-        TypeError: A range has one end only.
+        TypeError: A range has one end only, or `Meaning` has no such field.
     """
-    about = Meaning(
-        help=help,
-        label=label,
-        unit=unit,
-        source=source,
-        low=low,
-        high=high,
-        choices=tuple(choices),
-        is_joined=is_joined,
-        counts_with=counts_with,
-        former=former,
-        group=group,
-        metavar=metavar,
-        shown=shown,
-        flag=flag,
-        convert=convert,
-        reads=reads,
-        is_positional=is_positional,
-        is_common=is_common,
-    )
-    return field(default=default, metadata={ABOUT: about})
+    return field(default=default, metadata={ABOUT: Meaning(help=help, **meaning)})
 
 
 # An option that `--help` shows and does not leave to `--help-all`.
@@ -269,82 +236,6 @@ def as_typed(value: object) -> str:
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 
-def did_you_mean(typed: object, known: Iterable[str], former: Mapping[str, str] = NO_NAMES) -> str:
-    """End a complaint about an unknown name: the known one most like it, or nothing.
-
-    Args:
-        typed: The unknown name.
-        known: Those that are known.
-        former: Those that were known, and what they are called now.
-    """
-    names = {name.lstrip("-"): name for name in known}  # flags are not alike for their dashes
-    bare = str(typed).lstrip("-")
-    likely = [name for name in names if name == former.get(bare)]
-    likely += [name for name in names if bare in name.split("_")[1:]]  # windows of num_windows
-    likely += get_close_matches(bare, names, n=1)
-    return f"; did you mean {names[likely[0]]}?" if likely else ""
-
-
-def check_names(
-    what: str,
-    given: Iterable[str],
-    known: Iterable[str],
-    former: Mapping[str, str] = NO_NAMES,
-) -> None:
-    """Raise TypeError, in Python's words, which TorchRL reads, for a keyword that is not known."""
-    known = list(known)
-    for name in given:
-        if name not in known:
-            hint = did_you_mean(name, known, former) or f"; it has {', '.join(known)}"
-            raise TypeError(f"{what} got an unexpected keyword argument {name!r}{hint}")
-
-
-def check_kind(
-    what: str, value: object, kinds: type[Any] | tuple[type[Any], ...], such_as: str
-) -> None:
-    """Pass if an argument is of a kind; raise TypeError, naming one that is, if not."""
-    if not isinstance(value, kinds):
-        allowed = kinds if isinstance(kinds, tuple) else (kinds,)
-        names = " or ".join(kind.__name__ for kind in allowed)
-        rule = f"{what} must be of the type {names}, such as {such_as}"
-        raise TypeError(f"{rule}, not {_shown(value)}")
-
-
-def name_of(part: object) -> str:
-    """Return the name of a function or a class, or of an object's class, for messages."""
-    part = unwrapped(part)
-    return getattr(part, "__name__", type(part).__name__)
-
-
-def unwrapped(part: object) -> object:
-    """Return the function or class that a partial one is made of."""
-    while isinstance(part, partial):
-        part = part.func
-    return part
-
-
-def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
-    """Raise TypeError unless an argument is callable with these arguments."""
-    if isinstance(value, type) or not callable(value):
-        raise TypeError(f"{what} must be a function, or an object like one, not {_shown(value)}")
-    try:
-        signature = inspect.signature(value)
-    except (TypeError, ValueError):  # of what is not Python's own
-        return
-    try:
-        signature.bind(*takes)
-    except TypeError as error:
-        rule = f"a {what} is called with ({', '.join(takes)})"
-        raise TypeError(f"{rule}, but this one takes {signature}") from error
-
-
-def _shown(value: object) -> str:
-    """Return a wrong argument, and what to do about a class in place of its object."""
-    if isinstance(value, type):
-        return f"the class {value.__name__}; make an object of it, {value.__name__}(...)"
-    return f"{value!r:.80}"
-
-
 def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     """Check one value of a field, which may be `called` otherwise where it was given."""
     about = about_of(spec)
@@ -362,17 +253,3 @@ def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     if not is_allowed:
         shown = repr(value) if isinstance(value, str) else value
         raise ValueError(f"{label} must be {described}{limits}, not {shown}")
-
-
-def check_choice(
-    label: str, value: object, choices: Collection[str], *, is_joined: bool = False
-) -> None:
-    """Raise ValueError unless a value is one of the choices, or some of them joined by commas."""
-    typed = [value]
-    if is_joined and isinstance(value, str):
-        typed = [each.strip() for each in value.split(",")]
-    for each in typed:
-        if each not in choices:
-            joined = ", or several joined by commas" if is_joined else ""
-            rule = f"{label} must be one of {', '.join(choices)}{joined}"
-            raise ValueError(f"{rule}, not {each!r}{did_you_mean(each, choices)}")

@@ -8,7 +8,9 @@ from types import FrameType
 from typing import Any
 
 _pressed = [False]  # whether Ctrl-C was pressed within `interruptible`
-INTERRUPTS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
+# Windows knows no hang-up.
+HANG_UP: signal.Signals | None = getattr(signal, "SIGHUP", None)
+INTERRUPTS = tuple(each for each in (signal.SIGINT, signal.SIGTERM, HANG_UP) if each is not None)
 
 
 def end_on_interrupt() -> None:
@@ -66,9 +68,10 @@ def deferred_interrupt() -> Iterator[Callable[[], bool]]:
 
     def note(number: int, frame: FrameType | None) -> None:
         nonlocal was_pressed
-        is_first, was_pressed = not was_pressed, True
+        is_first = not was_pressed
+        was_pressed = True
         # A terminal that is closed hangs up more than once, so a hang-up is never the second.
-        if not is_first and number != signal.SIGHUP:
+        if not is_first and number != HANG_UP:
             signal.default_int_handler(number, frame)
 
     with _heard_by(note):

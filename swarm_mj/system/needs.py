@@ -1,11 +1,10 @@
 """Memory and disk: whether this machine has left what a command needs, asked before the work.
 
-What is needed, those know who fill it: `simulation.memory`, `replay.recorder`, `learning`.
+What is needed, those know who fill it: `simulation.memory`, `replay.replay_size`, `learning`.
 """
 
 import math
 import os
-import resource
 import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -13,6 +12,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import psutil
+
+try:
+    import resource
+except ImportError:  # Windows, which has no such limits
+    resource = None
 
 YES = "start even though memory or disk may not suffice"  # the help of --yes
 WAY_ON = ", or try it with --yes"
@@ -82,14 +86,18 @@ def free_memory() -> int:
 
 
 def peak_memory() -> int:
-    """Return the most memory that this process has held [bytes]; only Linux says so."""
+    """Return the most memory that this process has held [bytes]; macOS says only what it holds."""
     # `resource` would also count the process that started this one.
-    return 1024 * int(Path("/proc/self/status").read_text().partition("VmHWM:")[2].split()[0])
+    status = Path("/proc/self/status")
+    if status.exists():
+        return 1024 * int(status.read_text().partition("VmHWM:")[2].split()[0])
+    held = psutil.Process().memory_info()
+    return int(getattr(held, "peak_wset", held.rss))
 
 
 def free_addresses() -> float:
     """Return the addresses that `ulimit -v` leaves this process, filled or not; may be infinite."""
-    return _limit(resource.RLIMIT_AS) - psutil.Process().memory_info().vms
+    return _limit("RLIMIT_AS") - psutil.Process().memory_info().vms
 
 
 def free_room(path: Path) -> int:
@@ -101,11 +109,14 @@ def free_room(path: Path) -> int:
 
 def largest_file() -> float:
     """Return how large a file may get under `ulimit -f`; may be infinite."""
-    return _limit(resource.RLIMIT_FSIZE)
+    return _limit("RLIMIT_FSIZE")
 
 
-def _limit(which: int) -> float:
-    limit, _ = resource.getrlimit(which)
+def _limit(which: str) -> float:
+    """Return a limit of `resource`, by its name there."""
+    if resource is None:
+        return math.inf
+    limit, _ = resource.getrlimit(getattr(resource, which))
     return math.inf if limit == resource.RLIM_INFINITY else float(limit)
 
 

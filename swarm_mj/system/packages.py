@@ -20,6 +20,7 @@ CORE = (
     "packaging",
     "psutil",
     "rich",
+    "scipy",
 )
 # Modules that are named otherwise than the packages that bring them.
 BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}

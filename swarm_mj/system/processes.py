@@ -19,12 +19,15 @@ GUARD = """
 import os, signal, sys
 for number in [int(line) for line in sys.stdin]:
     try:
-        os.kill(number, signal.SIGKILL)
-    except ProcessLookupError:
+        os.kill(number, getattr(signal, "SIGKILL", signal.SIGTERM))
+    except OSError:
         pass
 """
 # Waits for its guard to know it; is gone if nobody is left to say so.
 GATE = 'read -r go && exec "$@"'
+# Windows has neither groups of processes nor `sh`: there only the program itself is ended, and no
+# gate keeps it from outliving a process that is killed as it starts it.
+HAS_GROUPS = hasattr(os, "killpg")
 
 
 @contextmanager
@@ -75,10 +78,11 @@ def running(
     output: IO[str] | None = None,  # where this process's goes
 ) -> Iterator[subprocess.Popen[bytes]]:
     """Start a program that ends, with all that it started, when the block or this process does."""
+    gated = ["sh", "-c", GATE, "sh", *command] if HAS_GROUPS else list(command)
     with (
         guard() as watch,
         subprocess.Popen(
-            ["sh", "-c", GATE, "sh", *command],
+            gated,
             stdin=subprocess.PIPE,
             stdout=output,
             stderr=output,
@@ -88,13 +92,17 @@ def running(
     ):
         pipe: Any = process.stdin
         try:
-            watch(-process.pid)
-            pipe.write(b"go\n")
+            watch(-process.pid if HAS_GROUPS else process.pid)
+            if HAS_GROUPS:
+                pipe.write(b"go\n")
             pipe.close()
             yield process
         finally:
-            with suppress(ProcessLookupError):
-                os.killpg(process.pid, signal.SIGKILL)
+            if HAS_GROUPS:
+                with suppress(ProcessLookupError):
+                    os.killpg(process.pid, signal.SIGKILL)
+            else:
+                process.kill()
 
 
 def attempt(

@@ -16,17 +16,23 @@ from typing import Annotated, Any, BinaryIO, TypeVar
 import msgspec
 
 from swarm_mj.system.fields import former_names
+from swarm_mj.system.streams import check_printable
 
 Kind = TypeVar("Kind")
 Row = tuple[int, dict[str, str]]
 
 MAX_LETTERS = 160  # of what msgspec says
+# To open a pipe must not wait for who writes it. Windows has no such flags, but one that keeps it
+# from changing line ends.
+OPENED = os.O_RDONLY
+for flag in ("O_CLOEXEC", "O_NONBLOCK", "O_BINARY"):
+    OPENED |= getattr(os, flag, 0)
 
 
 def open_file(path: Path, what: str) -> BinaryIO:
     """Open a regular file, or raise ValueError at once: a pipe might have no end."""
     try:
-        number = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NONBLOCK)
+        number = os.open(path, OPENED)
     except FileNotFoundError:
         raise ValueError(f"{what} {path} cannot be found") from None
     except OSError as error:
@@ -63,7 +69,16 @@ def read_rows(path: Path, what: str, most_bytes: int) -> list[Row]:
     for line, row in rows:
         if None in row or None in row.values():
             raise ValueError(f"{what} {path}, line {line}: as many cells as columns are needed")
+        for cell in (*row, *row.values()):
+            _check_cell(f"{what} {path}, line {line}", cell)
     return rows
+
+
+def _check_cell(where: str, cell: str) -> None:
+    try:
+        check_printable(cell, "write it without them")
+    except ValueError as error:
+        raise ValueError(f"{where}: {error}") from error
 
 
 def read_json(text: bytes | str, kind: type[Kind]) -> Kind:

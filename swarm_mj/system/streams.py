@@ -1,9 +1,14 @@
-"""Standard streams that take whatever is printed, on any terminal, or on none."""
+"""Standard streams that take whatever is printed, on any terminal, or on none.
+
+And texts that do not drive a terminal: a name from a file may hold breaks and escape sequences.
+"""
 
 import errno
 import io
 import os
+import re
 import sys
+import unicodedata
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from typing import Any, TypeVar
@@ -11,6 +16,25 @@ from typing import Any, TypeVar
 Stream = TypeVar("Stream")
 
 GONE = (errno.EPIPE, errno.EIO)  # a pipe's reader has closed it; the terminal is closed
+
+
+# Characters that move the cursor, change colours or end a line.
+CONTROL = re.compile("[\x00-\x1f\x7f-\x9f\u2028\u2029]")
+
+
+def check_printable(text: str, way_out: str) -> None:
+    """Raise ValueError for a name that would drive the terminal that it is printed on."""
+    if CONTROL.search(text):
+        raise ValueError(f"{text!a:.80} has control characters; {way_out}")
+
+
+def in_a_line(text: str) -> str:
+    """Return a text with what cannot be printed, line breaks too, as Python would write it."""
+    shown: list[str] = []
+    for character in text:
+        is_plain = character.isprintable() or unicodedata.category(character) == "Zs"
+        shown.append(character if is_plain else character.encode("unicode_escape").decode())
+    return "".join(shown)
 
 
 @contextmanager

@@ -34,7 +34,9 @@ def quiet_console() -> Console:
 
 def num_cores() -> int:
     """Return how many cores this process may use."""
-    return len(os.sched_getaffinity(0)) if sys.platform == "linux" else os.cpu_count() or 1
+    if hasattr(os, "sched_getaffinity"):  # Linux
+        return len(os.sched_getaffinity(0))
+    return os.cpu_count() or 1
 
 
 def tell_cores(number: int, what: str = "jobs") -> None:
@@ -48,7 +50,8 @@ def tell_cores(number: int, what: str = "jobs") -> None:
 def named_values(title: str, rows: dict[str, str], caption: str | None = None) -> Table:
     """Return a table of values beside their names."""
     table = Table(title=title, title_justify="left", show_header=False)
-    table.caption, table.caption_justify = caption, "left"
+    table.caption = caption
+    table.caption_justify = "left"
     for name, value in rows.items():
         table.add_row(name, value)
     return table
@@ -76,7 +79,8 @@ class WorkBar:
         console: Console | None = None,
     ) -> None:
         """Prepare the bar, on standard error by default; without a unit, it shows no numbers."""
-        self.what, self.text = what, ""
+        self.what = what
+        self.text = ""
         console = console or Console(stderr=True, highlight=False)
         count = f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"
         self._bar = Progress(

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from types import ModuleType
 
-from swarm_mj.system.fields import did_you_mean, unwrapped
+from swarm_mj.system.arguments import did_you_mean, unwrapped
 
 FORM = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 ARGUMENT = "mission"  # the name of the one argument that users' code may ask for
@@ -151,9 +151,12 @@ def one_line_each() -> Iterator[None]:
     except (Exception, SystemExit) as error:
         # What stops a generator comes out of it as another error, whose cause has the frames.
         causes = [each for each in (error, error.__cause__) if each is not None]
-        frames = [each for cause in causes for each in traceback.walk_tb(cause.__traceback__)]
-        modules = [frame.f_globals.get("__name__", "") for frame, _ in frames]
-        theirs = [module for module in modules if module in _loaded]
+        theirs: list[str] = []
+        for cause in causes:
+            for frame, _ in traceback.walk_tb(cause.__traceback__):
+                module = frame.f_globals.get("__name__", "")
+                if module in _loaded:
+                    theirs.append(module)
         if not theirs:
             raise
         innermost = theirs[-1]  # as it raised

@@ -7,7 +7,6 @@ unfinished part beside it: the next to write there removes it.
 
 import csv
 import errno
-import fcntl
 import glob
 import io
 import json
@@ -18,6 +17,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import Any, BinaryIO, NamedTuple
+
+try:
+    import fcntl
+except ImportError:  # Windows, where no file that is open can be renamed or removed
+    fcntl = None
 
 PAGE = bytes(4096)  # a full disk takes an empty file, but not this
 # The machine's fault, not the name's: the disk is full, fails, or takes nothing.
@@ -43,6 +47,8 @@ def write_bytes(path: Path, content: bytes | memoryview) -> None:
     """
     with _named(path), _part(path) as (target, part):
         _write(part, content)
+        if fcntl is None:
+            part.close()
         os.replace(part.name, target)
         _flush(target.parent)
 
@@ -130,7 +136,8 @@ def owned(path: Path) -> Iterator[None]:
     lock = FileLock(hidden, blocking=False, fallback_to_soft=False)
     try:
         lock.acquire()
-        hidden.write_text(str(os.getpid()))
+        if fcntl is not None:  # Windows lets nobody write into a locked file
+            hidden.write_text(str(os.getpid()))
     except Timeout:
         owner = _said_by(hidden) or "of another user"
         ways = "wait until it is done, end it, or name another"
@@ -141,8 +148,12 @@ def owned(path: Path) -> Iterator[None]:
     try:
         yield
     finally:
+        if fcntl is None:
+            lock.release()
         # Before it is unlocked: a process that waits for it sees that it has no name any more.
-        hidden.unlink(missing_ok=True)
+        # Windows removes it only afterwards, and not if another process has it by then.
+        with suppress(PermissionError):
+            hidden.unlink(missing_ok=True)
         lock.release()
         with suppress(OSError):  # until one is not empty
             for folder in made:
@@ -184,8 +195,9 @@ def _part(path: Path) -> Iterator[tuple[Path, BinaryIO]]:
     part = target.with_name(f".{target.name}.{secrets.token_hex(4)}.part")
     try:
         with part.open("xb") as file:
-            with suppress(OSError):  # on disks without locks parts of the killed stay
-                fcntl.flock(file, fcntl.LOCK_EX)
+            if fcntl is not None:
+                with suppress(OSError):  # on disks without locks parts of the killed stay
+                    fcntl.flock(file, fcntl.LOCK_EX)
             yield target, file
     finally:
         part.unlink(missing_ok=True)
@@ -196,6 +208,10 @@ def _sweep(target: Path) -> None:
     # The kernel gives their locks back. A process number would not tell whether they are alive:
     # other machines and containers may share the disk, and numbers are given again.
     for part in target.parent.glob(f".{glob.escape(target.name)}.{'[0-9a-f]' * 8}.part"):
+        if fcntl is None:
+            with suppress(PermissionError):  # another process still writes it
+                part.unlink(missing_ok=True)
+            continue
         with suppress(OSError), part.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
             part.unlink()

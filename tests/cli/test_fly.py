@@ -73,6 +73,7 @@ REFUSED = {
     "--seed -1": "not [-1]",
     "--seed 18446744073709551616": "from 0 to 9223372036854775807",
     "--observer 40": "observer must be from 0 to 39, not 40",
+    "--observer 2 --no-record": "--observer is whose knowledge a replay shows; leave out --no-rec",
     "--range-ratio 0.02": "too sparse",
     "--record replay.txt": "must be named *.rrd",
     "--record a.rrd --json ./a.rrd": "same file",

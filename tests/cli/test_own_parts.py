@@ -57,6 +57,17 @@ def pillar(spec, mission):
 def breaks(buffers, states):
     raise RuntimeError("out of order")
 
+calls = []
+
+def wears_out(buffers, states):
+    calls.append(len(calls))
+    if len(calls) > 10:
+        raise RuntimeError("worn out")
+    return -states.velocity_mps
+
+def text():
+    return "tdma"
+
 class Ages(FeatureExtractor):
     names = ("age", "is oneself")
     def graphs(self, views):
@@ -117,16 +128,49 @@ def test_an_evaluation_makes_them_in_every_process_and_says_which(succeed, tmp_p
 
 
 def test_an_evaluation_goes_on_with_the_same_parts_only(refusal, swarm_mj, tmp_path):
-    evaluate = ("evaluate", *SMALL, "--policy", "tdma", "--episodes", 2, "--csv", "r.csv")
+    evaluate = ("evaluate", *SMALL, "--policy", "tdma", "--episodes", 30, "--csv", "r.csv")
     channel = ("--channel", "my_parts:Lossy")
-    breaking = ("--controller", "my_parts:breaks")
+    breaking = ("--controller", "my_parts:wears_out")  # after the first 25 missions
     done = swarm_mj(*evaluate, *channel, *breaking)
     assert done.returncode == 2
-    assert "controller my_parts:breaks raised RuntimeError: out of order (my_par" in done.stderr
+    assert "controller my_parts:wears_out raised RuntimeError: worn out (my_par" in done.stderr
     assert "is of another evaluation" in refusal(*evaluate, *channel, "--resume")
     with (tmp_path / "my_parts.py").open("a") as file:
         file.write("# changed\n")
     assert "is of another evaluation" in refusal(*evaluate, *channel, *breaking, "--resume")
+
+
+@pytest.mark.parametrize("ending", [".csv", ".json"])
+def test_a_part_that_fails_at_once_leaves_no_progress(refusal, ending):
+    """The progress, with nothing flown, had to be replaced by --force once the part was mended."""
+    breaking = ("--controller", "my_parts:breaks", "--policy", "tdma")
+    refusal("evaluate", *SMALL, *breaking, "--episodes", 2, ending.replace(".", "--"), f"r{ending}")
+
+
+UNSOUND = {  # parameters, and what is said of them
+    "'x'": "must be a dictionary of numbers by their names, not 'x'",
+    "None": "must be a dictionary of numbers by their names, not None",
+    "{1: 2}": "must have a text as its name, not 1",
+    "{'a': float('nan')}": "parameter a of Odd must be finite, not nan",
+    "{'a': float('inf')}": "parameter a of Odd must be finite, not inf",
+    "{'a': 2**63}": "must be an integer of 64 bits at most, not one of 65",
+    "{'a': 10**400}": "must be an integer of 64 bits at most, not one of 13",
+    "{'a': [1]}": "must be a plain number, a text, True or False, not [1]",
+}
+
+
+@pytest.mark.parametrize("parameters", UNSOUND)
+def test_parameters_that_no_result_can_hold_are_refused_before_the_work(
+    refusal, tmp_path, parameters
+):
+    """A flight went to its end first, and was lost."""
+    with (tmp_path / "my_parts.py").open("a") as file:
+        file.write(f"\nclass Odd(Coin):\n    parameters = {parameters}\n")
+    for command in ("fly --record a.rrd", "evaluate --json a.json"):
+        name, *output = command.split()
+        said = refusal(name, *SMALL, *output, "--policy", "my_parts:Odd")
+        assert UNSOUND[parameters] in said
+    assert UNSOUND[parameters] in refusal("policies", "my_parts:Odd")
 
 
 def test_the_scene_is_in_the_file(succeed, tmp_path):
@@ -138,6 +182,9 @@ REFUSED = {
     "--policy my_parts:Lossy": "must make a DecentralisedPolicy or a CentralisedPolicy",
     "--policy my_parts:Coin --probability 0.1": "takes no transmission probab",
     "--policy my_parts:Coin --deterministic": "applies to learned policies only",
+    "--channel my_parts:text": "must be a function, or an object like one, not 'tdma'",
+    "--controller os:getcwd": "must be a function, or an object like one, not '/",
+    "--scene my_parts:text": "must be a function, or an object like one, not 'tdma'",
     "--channel your_parts:Lossy": "there is no module your_parts in",
     "--controller my_parts:breaks": "controller my_parts:breaks raised RuntimeError: out",
     "--features my_parts:Coin": "no policy here was trained on the features my_parts:Co",

@@ -100,8 +100,9 @@ def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
     assert "receptive_field" in shown
     assert "beyond the paper" not in shown  # nobody has listed what it uses
     assert "fly --policy mine" in shown
-    assert main(["policies", "nobody"]) == 2
-    assert "nobody" in capsys.readouterr().err
+    for nobody in ("nobody", ""):
+        assert main(["policies", nobody]) == 2
+        assert f"not {nobody!r}" in capsys.readouterr().err
 
 
 OWN = """

@@ -7,6 +7,7 @@ import pytest
 from channels import to_the_addressee
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from turns import settled
 
 from swarm_mj.envs.credit import credits_of, gain, snapshot_channel
 from swarm_mj.envs.mission_batch import MissionBatch
@@ -33,7 +34,7 @@ def credits_by_replay(swarm, channel, buffers, recipient, now):
 
     def total_after(recipient):
         replayed = copy.deepcopy(buffers)
-        window(replayed, swarm.states, recipient, copy.deepcopy(channel), now)
+        window(replayed, *settled(swarm.states, recipient), copy.deepcopy(channel), now)
         return (replayed.timestamp * counted).sum(axis=(1, 2))
 
     together = total_after(recipient)

@@ -144,6 +144,20 @@ def test_refused_actions():
         SwarmVectorEnv(2, reward="credit")
 
 
+def test_nothing_moves_unless_all_actions_are_robots():
+    """Batches are flown one by one: those before the bad one had moved a window."""
+    env = SwarmVectorEnv(NUM_ENVS, **SMALL)
+    env.reset(seed=0)
+    env.reset(seed=4, options={"reset_mask": np.array([False, True, False])})
+    bad = np.zeros((NUM_ENVS, 5), dtype=int)
+    bad[1, 0] = 99
+    with pytest.raises(ValueError, match="action of robot 0 in mission 1 must be from 0 to 4"):
+        env.step(bad)
+    assert [batch.flown.now[0] for batch in env._batches] == [0.0] * NUM_ENVS
+    env.step(np.zeros((NUM_ENVS, 5), dtype=">i2"))
+    assert [batch.flown.now[0] for batch in env._batches] == [1.0] * NUM_ENVS
+
+
 OWN = """
 from dataclasses import replace
 from swarm_mj.policies.gnn.graphs import PaperFeatures

@@ -82,6 +82,38 @@ def test_sb3_contrib_gets_the_masks_of_a_single_environment():
     assert model.learn(16).num_timesteps == 16
 
 
+@pytest.mark.parametrize(
+    ("agent", "given", "said"),
+    [
+        ("robot", "x", r"actions must have shape \(8,\), not \(\)"),
+        ("robot", None, r"actions must have shape \(8,\), not \(\)"),
+        ("robot", [0, 0], r"actions must have shape \(8,\), not \(2,\)"),
+        ("robot", np.zeros((8, 2), dtype=int), r"not \(8, 2\)"),
+        ("robot", ["a"] * 8, "action must be integers from 0 to 3, not <U1"),
+        ("robot", [0, [1]], "actions must be an array, or lists of the same length"),
+        ("team", 5, r"actions must have shape \(2, 4\), not \(\)"),
+        ("team", np.zeros((2, 4)), "action must be integers from 0 to 3, not float64"),
+    ],
+)
+def test_actions_of_other_kinds_are_refused(agent, given, said):
+    env = make_vec_env("stationary", 2, agent=agent, seed=1, **SMALL)
+    env.reset()
+    env._actions = given  # `step_async` does no more, and its type is checked in tests only
+    with pytest.raises(ValueError, match=said):
+        env.step_wait()
+    assert env.batches[0].flown.now.tolist() == [0.0, 0.0]
+
+
+@pytest.mark.parametrize("shape", [(8,), (8, 1)])
+def test_actions_may_be_lists_and_wrapped_one_by_one(shape):
+    env = make_vec_env("stationary", 2, seed=1, **SMALL)
+    env.reset()
+    env._actions = np.zeros(shape, dtype=int).tolist()
+    env.step_wait()
+    env.step(np.zeros(shape, dtype=">i4"))
+    assert env.batches[0].flown.now.tolist() == [2.0, 2.0]
+
+
 def test_what_environments_do_not_have():
     env = make_vec_env(**SMALL)
     with pytest.raises(AttributeError, match="no environment has its own fly"):

@@ -13,6 +13,7 @@ import socket
 import subprocess
 import sys
 import time
+import types
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from tempfile import mkdtemp
@@ -175,6 +176,22 @@ def test_an_engine_that_is_not_installed_leaves_nothing(here, monkeypatch, capsy
     assert main(["evaluate", "--policy", "tdma", "--engine", engine, "--csv", "a.csv"]) != 0
     assert f"the engine {engine} needs {package}, which is not in" in capsys.readouterr().err
     assert list(here.iterdir()) == []
+
+
+def test_ray_that_does_not_start_is_an_error_of_one_line(monkeypatch):
+    """Ray raises bare exceptions, of several lines: they were a traceback."""
+
+    def fails(**_):
+        raise Exception("The node timed out.\n  Look at\n/tmp/ray")
+
+    ray = types.SimpleNamespace(
+        init=fails, shutdown=lambda: None, exceptions=types.SimpleNamespace(RayError=RuntimeError)
+    )
+    monkeypatch.setitem(sys.modules, "ray", ray)
+    with pytest.raises(
+        OSError, match=r"^Ray did not start: The node timed out\. Look at /tmp/ray$"
+    ):
+        list(Ray().run(square, [1]))
 
 
 def test_slurm_without_sbatch_is_refused(monkeypatch, tmp_path):

@@ -1,16 +1,23 @@
 """Terminals, folders and names that are not as they usually are."""
 
 import io
+import json
 import os
 import subprocess
 import sys
+from dataclasses import asdict
 
+import pyarrow as pa
 import pytest
+import synthetic
 from damage import RESULTS
+from pyarrow import parquet
 
 import swarm_mj
 from swarm_mj.cli import main
+from swarm_mj.evaluation.results import COLUMNS
 from swarm_mj.replay.read import check_replay
+from swarm_mj.system.writing import write_csv
 
 ROBOTS = ("--robots", "4", "--windows", "3")
 FLIGHT = ("fly", *ROBOTS, "--no-record")
@@ -126,6 +133,97 @@ def test_a_name_that_is_not_utf8_is_refused_before_the_work(here, capsys, argume
     assert "udcff" in line
     assert "utf-8; rename it" in line
     assert not list(here.iterdir())
+
+
+DRIVES = "a\nb\x1b[31mred\x9b2J\u2028c"  # a terminal that shows it raw
+
+
+def in_one_dull_line(said):
+    """Passes if what was said is one line that drives no terminal."""
+    assert said.endswith("\n")
+    assert said[:-1].isprintable(), ascii(said)
+
+
+@pytest.mark.fault("odd machine: names")
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        (DRIVES,),
+        ("fly", DRIVES),
+        (*FLIGHT, f"--{DRIVES}"),
+        (*FLIGHT, "--task", DRIVES),
+        (*FLIGHT, "--policy", DRIVES),
+        (*FLIGHT, "--policy", f"{DRIVES}:Mine"),
+        (*FLIGHT, "--channel", f"table:{DRIVES}"),
+        (*FLIGHT, "--arena", f"{DRIVES}.xml"),
+        (*FLIGHT[:-1], "--record", f"{DRIVES}.rrd"),
+        (*EVALUATION, "--csv", f"{DRIVES}.csv"),
+        ("train", "--out", DRIVES, "--budget", "1"),
+        ("policies", DRIVES),
+        ("replay", f"{DRIVES}.rrd"),
+        ("study", "run", f"{DRIVES}.toml"),
+        ("scene", "--out", f"{DRIVES}.xml"),
+    ],
+)
+def test_no_name_drives_the_terminal(here, capsys, arguments):
+    """Line breaks and escape sequences were printed as they are, or written into file names."""
+    assert main(list(arguments)) == 2
+    said = capsys.readouterr()
+    assert not said.out
+    in_one_dull_line(said.err)
+    assert not list(here.iterdir())
+
+
+QUOTED = json.dumps(DRIVES)
+STUDIES = [
+    f"{QUOTED} = 1",
+    f"[study]\n{QUOTED} = 1",
+    f"[study]\npolicies = [{QUOTED}]",
+    f'[study]\npolicies = ["gnn"]\nfeatures = {QUOTED}',
+    f"[study.components]\nchannel = {QUOTED}",
+    f"[missions.{QUOTED}]\nnum_robots = 3",
+    f"[mission]\narena = {QUOTED}",
+    f"[mission]\nnum_robots = [3, {QUOTED}]",
+    f"x = [[{{a = {QUOTED}}}]]",
+]
+
+
+@pytest.mark.fault("odd machine: names")
+@pytest.mark.parametrize("text", STUDIES)
+def test_no_name_in_a_study_drives_the_terminal(here, capsys, text):
+    (here / "s.toml").write_text(text, encoding="utf-8")
+    assert main(["study", "run", "s.toml"]) == 2
+    said = capsys.readouterr().err
+    in_one_dull_line(said)
+    assert "has control characters; write it without them" in said
+
+
+@pytest.mark.fault("odd machine: names")
+def test_no_name_in_results_drives_the_terminal(here, capsys):
+    """Neither in a table that `figures` draws, nor in missions that `study compare` prints."""
+    rows = [asdict(each) for each in synthetic.everything()]
+    rows[0]["policy"] = DRIVES
+    write_csv(here / "r.csv", COLUMNS, rows)
+    assert main(["figures", "r.csv", "--out", "out"]) == 2
+    in_one_dull_line(capsys.readouterr().err)
+    assert main([*EVALUATION, "--parquet", "m.parquet"]) == 0
+    missions = parquet.read_table(here / "m.parquet")
+    names = pa.array([DRIVES] * len(missions))
+    place = missions.schema.get_field_index("policy")
+    parquet.write_table(missions.set_column(place, "policy", names), here / "m.parquet")
+    capsys.readouterr()
+    assert main(["study", "compare", "m.parquet", "m.parquet"]) == 2
+    in_one_dull_line(capsys.readouterr().err)
+
+
+@pytest.mark.fault("odd machine: names")
+def test_an_error_of_a_library_is_shown_in_one_dull_line(monkeypatch, capsys):
+    def fails(_):
+        raise ValueError(DRIVES)
+
+    monkeypatch.setattr("swarm_mj.cli.fly.run", fails)
+    assert main(list(FLIGHT)) == 2
+    in_one_dull_line(capsys.readouterr().err)
 
 
 @pytest.mark.fault("odd machine: names")

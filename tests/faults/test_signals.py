@@ -122,6 +122,49 @@ def test_a_real_ctrl_c_is_heard_from_the_first_moment_on(forks, tmp_path, tries,
         assert left == [] or "run/settings.json" in left, left
 
 
+# Runs `swarm-mj`, and hangs up while it imports a module; the exception is lost in a `__del__`.
+SWALLOWED = """
+import builtins, runpy, signal, sys
+class Swallows:
+    def __del__(self):
+        signal.raise_signal(signal.SIGHUP)
+left = sys.argv[1:2]
+importing = builtins.__import__
+def imports(name, *arguments, **options):
+    module = importing(name, *arguments, **options)
+    if name in left:
+        left.clear()
+        Swallows()
+    return module
+builtins.__import__ = imports
+sys.argv = ["swarm-mj", *sys.argv[2:]]
+runpy.run_module("swarm_mj", run_name="__main__")
+"""
+COMPARISON = ("study", "compare", "m.parquet", "m.parquet")
+LATE = {  # what a command loads only when it has begun, and what makes the command's input
+    "swarm_mj.evaluation.figures.style": (FIGURES, None),
+    "swarm_mj.evaluation.missions_table": (COMPARISON, (*BRIEF_EVALUATION[:-4], "--parquet")),
+    "swarm_mj.api.charts": (("curves", "run", "--plot", "c.svg"), TRAINING),
+}
+
+
+@pytest.mark.fault("signals")
+@pytest.mark.parametrize("module", LATE)
+def test_a_hang_up_that_a_module_swallows_while_it_loads_ends_the_command(forks, tmp_path, module):
+    """Fault 3: they drew, wrote or compared to their end, which they then called interrupted."""
+    command, before = LATE[module]
+    if before:
+        ending = ("m.parquet",) if before[-1] == "--parquet" else ("--budget", 128)
+        assert forks.run(tmp_path, "swarm_mj", *before, *ending).returncode == 0
+    script = tmp_path.with_suffix(".py")
+    script.write_text(SWALLOWED)
+    was = files(tmp_path)
+    done = forks.run(tmp_path, script, module, *command)
+    assert done.returncode == 130, done.stderr
+    assert "means over missions" not in done.stdout
+    assert files(tmp_path) == was
+
+
 @pytest.mark.fault("signals")
 def test_figures_leave_no_parts(random_tries):
     """Fault 24, of what is written outside of any flight."""

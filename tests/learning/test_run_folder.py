@@ -26,7 +26,7 @@ from swarm_mj.learning.run_folder import (
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.packet_memory import empty_memory
-from swarm_mj.replay.recorder import ON_DISK
+from swarm_mj.replay.replay_size import ON_DISK
 from swarm_mj.simulation.components import Components
 
 LIMITS = Limits(decisions=5, minutes=0.5, replay_every=3)

@@ -6,8 +6,8 @@ from typing import get_args
 import pytest
 
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper, reference
-from swarm_mj.mission.specification import Preset
-from swarm_mj.physics.arenas import BUILDING
+from swarm_mj.mission.team import Preset
+from swarm_mj.physics.materials import BUILDING
 from swarm_mj.radio.free_space import path_loss_db
 
 TASKS = ["stationary", "random-walk", "flocking"]

@@ -3,20 +3,14 @@
 import math
 import runpy
 from dataclasses import FrozenInstanceError, fields
-from typing import Literal, get_args, get_origin, get_type_hints
+from typing import Literal, get_args, get_origin
 
 import numpy as np
 import pytest
 
-from swarm_mj.mission import (
-    Mission,
-    MissionFields,
-    PresetAndFields,
-    TaskAndFields,
-    paper,
-    reference,
-)
+from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
+from swarm_mj.mission.labels import CHANNEL
 from swarm_mj.system.fields import about_of, former_names, kind_of
 
 # As users load it: without the type checks that these tests run under, which would answer first.
@@ -56,23 +50,6 @@ def test_the_papers_numbers(preset):
     assert {name: getattr(mission, name) for name in NUMBERS} == pytest.approx(NUMBERS)
 
 
-@pytest.mark.parametrize(
-    ("num_robots", "density", "side_m"),
-    # 10 robots need a quarter of 1 km², 90 at 10 per km² need 9 km², 2 need 1/20 km².
-    [(10, 40.0, 500.0), (90, 10.0, 3000.0), (160, 40.0, 2000.0), (2, 40.0, 223.60679775)],
-)
-def test_the_area_keeps_the_density(num_robots, density, side_m):
-    mission = paper(num_robots=num_robots, density_per_km2=density)
-    assert mission.side_m == pytest.approx(side_m)
-    assert mission.half_side_m == pytest.approx(side_m / 2)
-
-
-def test_ratios_mean_one_kilometre_whatever_the_team():
-    small = paper(num_robots=10, range_ratio=0.2, velocity_ratio=0.5, num_windows=7, window_s=0.2)
-    assert small.range_m == pytest.approx(200.0)
-    assert small.max_velocity_mps == pytest.approx(10.0)  # 500 m in 50 s
-
-
 def test_the_bare_mission_is_the_papers_text_with_walls():
     assert Mission() == paper("flocking", boundary="reflect")
 
@@ -105,22 +82,7 @@ def test_every_field_names_its_source_and_the_choices_of_its_type(spec):
         assert about.choices == get_args(spec.type)
 
 
-def test_type_checkers_are_told_of_every_field_by_its_type():
-    """One that is missing is a misspelt keyword to them; a wrong type, a wrong complaint."""
-    declared = {spec.name: spec.type for spec in fields(Mission)}
-    own = {"preset": declared.pop("preset"), "task": declared.pop("task")}
-    told = get_type_hints(MissionFields)
-    for name, kind in declared.items():
-        assert told.get(name) == kind, f"MissionFields lacks the line `{name}: {kind}`"
-    assert list(told) == list(declared), "MissionFields has the fields of Mission, in their order"
-    assert get_type_hints(PresetAndFields) == declared | {"preset": own["preset"]}
-    assert get_type_hints(TaskAndFields) == declared | {"task": own["task"]}
-    assert not MissionFields.__required_keys__
-
-
-CHANNEL_FIELDS = [
-    spec for spec in fields(Mission) if about_of(spec).group == mission_module.CHANNEL
-]
+CHANNEL_FIELDS = [spec for spec in fields(Mission) if about_of(spec).group == CHANNEL]
 
 
 @pytest.mark.parametrize("spec", CHANNEL_FIELDS, ids=lambda spec: spec.name)
@@ -266,38 +228,6 @@ def test_unknown_choices_are_refused(spec):
 def test_a_mission_cannot_change():
     with pytest.raises(FrozenInstanceError):
         paper().num_robots = 3
-
-
-@pytest.mark.parametrize(
-    ("given", "kept"),
-    [
-        ("nothing", "nothing"),
-        ("start", "start"),
-        ("start,map,statistics,map", "map,statistics,start"),
-        ("start, map", "map,start"),
-    ],
-)
-def test_what_is_known_has_one_order(given, kept):
-    mission = Unchecked(prior_knowledge=given)
-    assert mission.prior_knowledge == kept
-    granted = [what for what in ("map", "statistics", "start") if mission.grants(what)]
-    assert granted == [what for what in kept.split(",") if what != "nothing"]
-
-
-@pytest.mark.parametrize(
-    ("given", "complaint"),
-    [
-        ("mapp", "not 'mapp'; did you mean map?"),
-        ("map,", "or several joined by commas, not ''"),
-        ("map statistics", "not 'map statistics'"),
-        ("map,nothing", "nothing or some of map, statistics, start, not nothing,map"),
-        (3, "not 3"),
-    ],
-)
-def test_what_cannot_be_known_is_refused(given, complaint):
-    with pytest.raises(ValueError, match=r"^prior knowledge must be") as refusal:
-        Unchecked(prior_knowledge=given)
-    assert complaint in str(refusal.value)
 
 
 def test_an_arena_is_a_name():

@@ -11,15 +11,9 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import PRESETS, paper, reference
-from swarm_mj.physics.arenas import (
-    ARENAS,
-    DEFAULT_LOSS_DB,
-    MATERIALS,
-    OBSTACLE_GROUP,
-    notes_on,
-    obstacle_geoms,
-    obstacles_of,
-)
+from swarm_mj.physics.arenas import ARENAS, notes_on
+from swarm_mj.physics.materials import DEFAULT_LOSS_DB, MATERIALS
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP, obstacle_geoms, obstacles_of
 from swarm_mj.physics.scene import compose
 from swarm_mj.physics.state import BOX, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, SPHERE
 from swarm_mj.policies import make_policy
@@ -229,12 +223,31 @@ MESH = '<compiler {}="parts"/><asset><mesh name="m" file="stream.stl"/></asset>'
 BOXES = '<mujoco><worldbody>{}<geom type="box" size="9 9 9" group="1"/></worldbody></mujoco>'
 
 
+def copies(*counts):
+    """A ball that is copied, by counts from the outside to the inside."""
+    ball = '<geom size="1"/>'
+    for count in reversed(counts):
+        ball = f'<replicate count="{count}">{ball}</replicate>'
+    return ball
+
+
 @pytest.mark.parametrize(
     ("inside", "said"),
     [
         ('<geom type="box" size="1 9 9" pos="inf 0 5" group="1"/>', "has inf in pos"),
         ('<geom type="box" size="-infinity 9 9" group="1"/>', "has -infinity in size"),
-        ('<replicate count="100000"><geom size="1"/></replicate>', "10000 are allowed"),
+        (copies("100000"), "10000 are allowed"),
+        (copies(" 20000"), "10000 are allowed"),
+        (copies("+2e4"), "10000 are allowed"),
+        (copies(9999, 9999), "multiplied where one is within another, make 99980000 copies or"),
+        (copies(100, 100, 100, 100), "10000 are allowed"),
+        (copies(6000) + copies(6000), "make 11998 copies or more"),
+        (
+            '<replicate count="5000"><include file="parts/many.xml"/></replicate>',
+            "make 14999 copies or more",
+        ),
+        ('<flexcomp name="f" type="grid" count="300 300 300"/>', "10000 are allowed"),
+        ("<frame>" * 3000 + copies(20000) + "</frame>" * 3000, "10000 are allowed"),
         ('<include file="pipe"/>', "include pipe is a folder, a pipe or a device"),
         ('<include file="parts/nested.xml"/>', "include pipe is a folder, a pipe or a device"),
         ('<include file="parts/endless.xml"/>', "geom wall has inf in pos"),
@@ -249,6 +262,7 @@ def test_files_without_an_end_are_refused_at_once(tmp_path, inside, said):
     (tmp_path / "parts" / "nested.xml").write_text(BOXES.format('<include file="pipe"/>'))
     endless = BOXES.format('<geom name="wall" size="1" pos="inf 0 5"/>')
     (tmp_path / "parts" / "endless.xml").write_text(endless)
+    (tmp_path / "parts" / "many.xml").write_text(BOXES.format(copies(3)))
     path = tmp_path / "arena.xml"
     path.write_text(
         f"<mujoco>{inside}{WALL}</mujoco>" if "compiler" in inside else BOXES.format(inside)
@@ -266,6 +280,33 @@ def test_a_relative_arena_includes_files_that_include_others(tmp_path, monkeypat
     monkeypatch.chdir(tmp_path)
     swarm = Swarm(paper("stationary", num_robots=3, arena="city/arena.xml"), [1])
     assert len(swarm._physics.obstacles.kind) == 1
+
+
+SETTINGS = [
+    '<option timestep="0.01" gravity="0 0 1"><flag contact="disable"/></option>',
+    '<size memory="1M"/>',
+    '<size njmax="50" nconmax="20"/>',
+    '<statistic extent="3" center="1 2 3"/>',
+    '<visual><map znear="0.1"/><headlight diffuse=".1 .1 .1"/></visual>',
+]
+
+
+@pytest.mark.parametrize("settings", SETTINGS)
+def test_a_file_s_settings_do_not_count_and_nothing_is_said(tmp_path, recwarn, capfd, settings):
+    """MuJoCo told of an "Attach conflict", twice, in up to seven lines."""
+    path = tmp_path / "arena.xml"
+    path.write_text(f"<mujoco>{settings}{WALL}</mujoco>")
+    swarm = Swarm(paper("random-walk", num_robots=3, physics="contact", arena=str(path)), [1])
+    swarm.start(make_policy("tdma", swarm.mission))
+    path.write_text(f"<mujoco>{WALL}</mujoco>")
+    plain = Swarm(swarm.mission, [1])
+    plain.start(make_policy("tdma", swarm.mission))
+    for _ in range(5):
+        swarm.step()
+        plain.step()
+    np.testing.assert_array_equal(swarm.states.position_m, plain.states.position_m)
+    assert not recwarn.list
+    assert capfd.readouterr() == ("", "")
 
 
 def test_files_that_include_each_other_are_refused(tmp_path):

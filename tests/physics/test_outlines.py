@@ -4,7 +4,7 @@ import mujoco
 import numpy as np
 import pytest
 
-from swarm_mj.physics.arenas import obstacles_of
+from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.outlines import footprints
 
 

@@ -4,6 +4,7 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
+from turns import settled
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.placement import connected_positions
@@ -83,7 +84,7 @@ def knowledge_after(team: Team, choices: np.ndarray) -> np.ndarray:
         position_m=np.broadcast_to(team.position_m, (*shape, 2)).copy(),
         velocity_mps=np.zeros((*shape, 2)),
     )
-    window(buffers, states, choices, team.radio, np.full(len(choices), team.now))
+    window(buffers, *settled(states, choices), team.radio, np.full(len(choices), team.now))
     return np.sum(buffers.timestamp, axis=(1, 2))
 
 

@@ -4,6 +4,7 @@ Windows of late requests and late answers stand in `tests/radio/test_asynchronou
 """
 
 import numpy as np
+from turns import settled
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
@@ -64,7 +65,8 @@ def test_a_late_broadcast_holds_what_was_known_before_the_slot_in_which_it_arriv
 def test_a_robot_notes_its_attempt_when_it_sends_and_not_when_the_packet_arrives():
     buffers, channel = empty_buffers(1, 3), lagging(0.0, 0.5, 0.0)
     recipient = np.array([[A, C, C]])
-    _, response = asynchronous_window.window(buffers, in_a_row(3), recipient, channel, np.zeros(1))
+    turn = settled(in_a_row(3), recipient)
+    _, response = asynchronous_window.window(buffers, *turn, channel, np.zeros(1))
     assert response.recipient.tolist() == [[A, B, C]]  # C decodes it too late to answer
     assert buffers.last_attempt[0].tolist() == [[0, 0, 0], [0, 0, 0.5], [0, 0, 0]]
 
@@ -76,8 +78,9 @@ def test_where_no_packet_is_late_it_is_the_readable_window():
     for _ in range(20):
         states = in_a_row(6, is_active=rng.random((1, 6)) < 0.8)
         recipient = np.where(rng.random((1, 6)) < 0.3, rng.integers(-1, 6, (1, 6)), np.arange(6))
-        mine = asynchronous_window.window(ours, states, recipient, asynchronous, now)
-        others = window.window(theirs, states, recipient, synchronous, now)
+        turn = settled(states, recipient)
+        mine = asynchronous_window.window(ours, *turn, asynchronous, now)
+        others = window.window(theirs, *turn, synchronous, now)
         now = now + 1.0
         mine += (asynchronous_window.broadcast(ours, states, recipient, asynchronous, now),)
         others += (window.broadcast(theirs, states, recipient, synchronous, now),)

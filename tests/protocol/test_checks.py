@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from swarm_mj.protocol.checks import check_robots, checked_decode
+from swarm_mj.protocol.checks import checked_decode, checked_robots
 from swarm_mj.radio.free_space import FreeSpaceRadio
 
 POSITION_M = np.zeros((1, 4, 2))
@@ -16,23 +16,43 @@ RECIPIENT = np.array([[1, 1, -1, 3]])  # 0 addresses 1, 2 broadcasts; 1 and 3 ar
 @pytest.mark.parametrize(("b", "i"), [(0, 0), (0, 2), (1, 1)])
 def test_choices_that_are_no_robots_are_refused(b, i, nobody):
     recipient = np.array([[0, 1, 2], [2, 1, 0]])
-    check_robots("recipient", recipient, (2, 3))
+    checked_robots("recipient", recipient, (2, 3))
     recipient[b, i] = nobody
     said = f"recipient of robot {i} in mission {b} must be from 0 to 2, not {nobody}"
     with pytest.raises(ValueError, match=said):
-        check_robots("recipient", recipient, (2, 3), may_broadcast=True)
+        checked_robots("recipient", recipient, (2, 3), may_broadcast=True)
 
 
 def test_everyone_is_a_choice_only_where_robots_may_broadcast():
-    check_robots("recipient", np.array([[-1, 1]]), (1, 2), may_broadcast=True)
+    checked_robots("recipient", np.array([[-1, 1]]), (1, 2), may_broadcast=True)
     with pytest.raises(ValueError, match="from 0 to 1, not -1"):
-        check_robots("recipient", np.array([[-1, 1]]), (1, 2))
+        checked_robots("recipient", np.array([[-1, 1]]), (1, 2))
+
+
+@pytest.mark.parametrize("kind", ["int8", "uint8", "<i4", ">i4", ">i8", ">u2", "uint64"])
+def test_integers_of_any_width_and_byte_order_are_those_of_compiled_loops(kind):
+    """Byte-swapped ones were an error of numba's, twenty lines long."""
+    chosen = checked_robots("recipient", np.array([[2, 0, 1]], dtype=kind), (1, 3))
+    assert chosen.dtype == np.int64
+    assert chosen.dtype.isnative
+    assert chosen.tolist() == [[2, 0, 1]]
+
+
+def test_the_largest_unsigned_integer_is_no_broadcast():
+    largest = np.array([[0, 2**64 - 1]], dtype=np.uint64)
+    with pytest.raises(ValueError, match=f"from 0 to 1, not {2**64 - 1}"):
+        checked_robots("recipient", largest, (1, 2), may_broadcast=True)
+
+
+def test_lists_of_different_lengths_are_refused():
+    with pytest.raises(ValueError, match="recipient must be an array, or lists of the same length"):
+        checked_robots("recipient", [[0, 1], [2]], (2, 2))
 
 
 @pytest.mark.parametrize("kind", [float, bool])
 def test_robots_are_named_by_integers(kind):
     with pytest.raises(ValueError, match=f"must be integers from 0 to 1, not {kind.__name__}"):
-        check_robots("recipient", np.array([[0, 1]], dtype=kind), (1, 2))
+        checked_robots("recipient", np.array([[0, 1]], dtype=kind), (1, 2))
 
 
 def answering(*heard):

@@ -4,6 +4,7 @@ from dataclasses import fields
 
 import numpy as np
 import pytest
+from turns import settled
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
@@ -104,8 +105,8 @@ def test_random_windows_and_broadcasts_leave_the_same_buffers(
         recipient = np.where(rng.random(recipient.shape) < 0.5, recipient, np.arange(num_robots))
         given = recipient.copy()
         phases = [
-            compiled_window.window(ours, states, recipient, radio, now, **how),
-            window.window(theirs, states, recipient, radio, now, **how),
+            compiled_window.window(ours, *settled(states, recipient), radio, now, **how),
+            window.window(theirs, *settled(states, recipient), radio, now, **how),
         ]
         now = now + 1.0
         assert all(equal(*(sum(each, ()) for each in phases)))

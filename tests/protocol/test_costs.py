@@ -10,14 +10,8 @@ from hypothesis import strategies as st
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import NO_PARENT, empty_buffers
-from swarm_mj.protocol.costs import (
-    PACKET_COUNTS,
-    age_of_information,
-    mean_hops,
-    no_packets,
-    velocity_variance,
-    window_costs,
-)
+from swarm_mj.protocol.costs import age_of_information, mean_hops, velocity_variance, window_costs
+from swarm_mj.protocol.packet_counts import PACKET_COUNTS, no_packets
 from swarm_mj.protocol.window import Phase
 
 seeds = st.integers(0, 2**32 - 1)

@@ -7,19 +7,14 @@ import pytest
 from channels import to_everyone, to_nobody, to_the_addressee, unreliable
 from hypothesis import given, settings
 from hypothesis import strategies as st
+from turns import settled
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.talk import talk_over
-from swarm_mj.protocol.window import (
-    DoubleBroadcast,
-    LocalViews,
-    RequestResponse,
-    broadcast,
-    channel_at,
-    window,
-)
+from swarm_mj.protocol.window import LocalViews, broadcast, channel_at, window
+from swarm_mj.protocol.window_protocols import DoubleBroadcast, RequestResponse
 from swarm_mj.simulation.swarm import Swarm
 
 seeds = st.integers(0, 2**32 - 1)
@@ -132,7 +127,7 @@ def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_list
     buffers, robots = empty_buffers(1, num_robots), [Robot(i) for i in range(num_robots)]
     for t in range(num_windows):
         body, recipient = course[t], recipients[t]
-        _, response = window(buffers, body, recipient, channel, np.array([float(t)]))
+        _, response = window(buffers, *settled(body, recipient), channel, np.array([float(t)]))
         states = np.concatenate([body.position_m[0], body.velocity_mps[0]], axis=1).tolist()
         states = dict(enumerate(map(tuple, states)))
         addressed = {i: j for i, j in enumerate(recipient[0].tolist()) if i != j}
@@ -144,7 +139,7 @@ def test_alg1_windows_as_played_with_dictionaries(seed, num_robots, senders_list
 def test_alg1_silence_counts_as_attempt_when_told_so():
     buffers = empty_buffers(1, 2)
     recipient, now = np.array([[1, 1]]), np.array([0.0])
-    window(buffers, standing(2), recipient, to_nobody, now, silence_is_attempt=True)
+    window(buffers, *settled(standing(2), recipient), to_nobody, now, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 0.5], [0.0, 0.5]]
     broadcast(buffers, standing(2), recipient, to_nobody, now + 2.5, silence_is_attempt=True)
     assert buffers.last_attempt[0].tolist() == [[0.0, 3.0], [0.0, 3.0]]
@@ -205,7 +200,8 @@ def test_inactive_robots_neither_send_nor_decode_nor_observe():
     """Robot 2 would answer 0, and 1 decodes 0 alone."""
     buffers = empty_buffers(1, 3)
     states = replace(standing(3), is_active=np.array([[True, True, False]]))
-    request, response = window(buffers, states, np.array([[2, 1, 1]]), to_everyone, np.zeros(1))
+    turn = settled(states, np.array([[2, 1, 1]]))
+    request, response = window(buffers, *turn, to_everyone, np.zeros(1))
     assert request.recipient.tolist() == [[2, 1, 2]]
     assert request.heard.tolist() == [[0, 0, 2]]
     assert response.recipient.tolist() == [[0, 1, 2]]
@@ -221,7 +217,8 @@ def test_the_channel_gets_the_true_positions_and_everyones_recipients():
         return to_the_addressee(position_m, recipient)
 
     states, recipients = some_mission(0, 1, 4, 2)
-    first, second = window(empty_buffers(2, 4), states[0], recipients[0], channel, np.zeros(2))
+    turn = settled(states[0], recipients[0])
+    first, second = window(empty_buffers(2, 4), *turn, channel, np.zeros(2))
     assert len(asked) == 2
     for (position_m, recipient), phase in zip(asked, (first, second), strict=True):
         assert (position_m == states[0].position_m).all()
@@ -244,7 +241,8 @@ class Schedule:
 def test_a_varying_channel_is_asked_for_each_slot_of_a_window():
     channel, buffers = Schedule(), empty_buffers(2, 3)
     recipient = np.array([[-1, 1, 2], [-1, 1, 2]])
-    first, second = window(buffers, standing(3, 2), recipient, channel, np.array([4.0, 4.0]))
+    turn = settled(standing(3, 2), recipient)
+    first, second = window(buffers, *turn, channel, np.array([4.0, 4.0]))
     assert channel.asked == [([8, 8], [0, 1]), ([9, 9], [0, 1])]
     assert first.heard.tolist() == [[0, 0, 0]] * 2
     assert second.heard.tolist() == [[0, 1, 2]] * 2

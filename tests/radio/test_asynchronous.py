@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from turns import settled
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
@@ -199,7 +200,7 @@ def lagging():
 def play(channel, buffers, recipient, now):
     position_m = np.array([[[0.0, 0.0], [10.0, 0.0], [20.0, 0.0]]])
     states = RobotStates(position_m=position_m, velocity_mps=np.zeros((1, 3, 2)))
-    return window(buffers, states, np.array([recipient]), channel, np.array([now]))
+    return window(buffers, *settled(states, np.array([recipient])), channel, np.array([now]))
 
 
 def test_a_late_request_is_not_answered_and_carries_what_was_known_when_it_was_sent():

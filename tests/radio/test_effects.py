@@ -13,7 +13,7 @@ from declared import where_class, where_field
 from walls import walls
 
 from swarm_mj.mission import Mission, paper
-from swarm_mj.mission.specification import FadingLaw, PathLossLaw
+from swarm_mj.mission.surroundings import FadingLaw, PathLossLaw
 from swarm_mj.protocol.packets import slot_bytes
 from swarm_mj.radio.carrier_sensing import CarrierSensing, usual_busy_dbm
 from swarm_mj.radio.effects import (
@@ -95,6 +95,11 @@ def test_every_number_of_the_channel_is_read_once():
         assert count[name] != 0, f"{place} is read by no effect, nor by the plain radio"
         assert count[name] == 1, f"{place} is read by several"
     assert {"position_noise_m", "position_noise_s"} <= NOISE
+
+
+def test_no_effect_is_left_out():
+    for effect in MissionEffect.__subclasses__():
+        assert effect in EFFECTS, f"{where_class(effect)}: {effect.__name__} is not in EFFECTS"
 
 
 @pytest.mark.parametrize("effect", EFFECTS)

@@ -114,6 +114,9 @@ def test_oracles_know_the_links_of_a_table_and_teams_are_connected_over_it(table
         ("x,y\n1,2\n", "has a first line x1_m,y1_m,x2_m,y2_m,gain_db"),
         (f"{HEADER}\n0,0,1,1,-50\n", "8 rows of finite numbers or more"),
         (f"{HEADER}\n" + "0,0,1,1,-inf\n" * 9, "-150 dB for no link"),
+        (f"{HEADER}\n", "8 rows of finite numbers or more"),
+        (f"{HEADER}\n" + "0,0,1,1,1e308\n" * 9, "from -1000 to 1000 dB, not 1e.308"),
+        (f"{HEADER}\n" + "0,0,1,-1e300,-60\n" * 9, r"from -1e.09 to 1e.09 m, not 1e.300"),
         (f"{HEADER}\n" + "0,0,1,1,x\n" * 9, "could not convert string 'x'"),
     ],
 )

@@ -9,7 +9,7 @@ from scipy.stats import norm
 from walls import walls
 
 from swarm_mj.mission import Mission, paper, reference
-from swarm_mj.mission.specification import Knowable
+from swarm_mj.mission.knowledge import Knowable
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.links import links_between, lone_probabilities

@@ -7,8 +7,9 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.costs import Packets
-from swarm_mj.replay.recorder import Log, Recorder
+from swarm_mj.protocol.packet_counts import Packets
+from swarm_mj.replay.log import Log
+from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.write import write_replay
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm

@@ -1,10 +1,10 @@
-"""Tree, age matrix, state lanes and plots, against plain loops."""
+"""Tree, age matrix and state lanes, against plain loops."""
 
 import numpy as np
 import pytest
-from reading import column, rows, static
+from reading import rows, static
 
-from swarm_mj.replay.charts import dendrogram, plots, radio_states
+from swarm_mj.replay.charts import dendrogram, radio_states
 from swarm_mj.replay.palette import age_colours
 
 
@@ -77,65 +77,22 @@ def test_a_small_tree_by_hand():
     # 0 - 1, 0 - 2, 2 - 3, 2 - 4; 5 is unknown. Leaves from the top: 1, 3, 4.
     parent = np.array([[-1, 0, 0, 2, 2, -1]], dtype=np.int32)
     is_known = np.array([[True, True, True, True, True, False]])
-    place = dendrogram(parent, is_known, 0)[0]
-    np.testing.assert_array_equal(place[:5, 0], [0, 1, 1, 2, 2])
-    np.testing.assert_allclose(place[[1, 3, 4], 1], [0.0, 0.5, 1.0])
-    np.testing.assert_allclose(place[2, 1], 0.75)  # amid 3 and 4
-    np.testing.assert_allclose(place[0, 1], 0.375)  # amid 1 and 2
-    assert np.all(np.isnan(place[5]))
-    lone = dendrogram(parent, np.arange(6)[None] == 1, 1)[0]
-    np.testing.assert_array_equal(lone[1], [0.0, 0.5])
+    tree = dendrogram(parent, is_known, 0)
+    np.testing.assert_array_equal(tree.hops[0], [0, 1, 1, 2, 2, np.nan])
+    # 0 stands amid 1 and 2, and 2 amid 3 and 4.
+    np.testing.assert_allclose(tree.height[0], [0.375, 0.0, 0.75, 0.5, 1.0, np.nan])
+    lone = dendrogram(parent, np.arange(6)[None] == 1, 1)
+    assert (lone.hops[0, 1], lone.height[0, 1]) == (0.0, 0.5)
 
 
 def test_edges_lead_from_hop_to_hop_and_no_two_robots_share_a_place(replay, two_way):
     log = two_way.log
     is_known = ~np.isnan(log.known_age)
-    known = dendrogram(log.parent, is_known, log.ego)[-1][is_known[-1]]
+    tree = dendrogram(log.parent, is_known, log.ego)
+    known = np.stack([tree.hops[-1], tree.height[-1]], axis=1)[is_known[-1]]
     assert len(np.unique(known, axis=0)) == len(known)
     strips = rows(replay, "/tree/edges", "LineStrips2D:strips", 2, 2)
     assert len(strips) == np.sum(log.has_parent)
     hops = strips[:, 1, 0] - strips[:, 0, 0]
     np.testing.assert_allclose(hops, hops[0], rtol=1e-4)
     assert hops[0] > 0.0
-
-
-@pytest.mark.parametrize(
-    ("flight", "names"),
-    [("two_way", ["delivered", "lost", "overheard", "answered"]), ("flooded", ["sent", "heard"])],
-)
-def test_the_packet_plot_counts_as_the_costs_do(flight, names, request):
-    recorded = request.getfixturevalue(flight)
-    _, plot, *_ = plots(recorded.log)
-    assert [curve.entity.path for curve in plot.curves] == [f"plots/radio/{name}" for name in names]
-    for curve, name in zip(plot.curves, names, strict=True):
-        counts = recorded.counted(name)
-        expected = [sum(counts[max(0, t - 9) : t + 1]) for t in range(len(counts))]
-        np.testing.assert_array_equal(curve.values, expected)
-
-
-def test_the_plot_of_the_world_has_shares_of_links_and_robots(blocked, blocked_replay):
-    log = blocked.log
-    expected = {"believed, too weak": [], "works, unbelieved": [], "cut off from r4": []}
-    weak, works, cut_off = expected.values()
-    for window in log.mismatch.window.tolist():
-        where, is_weak = log.position_m[window - 1], log.mismatch.at(window)["is_too_weak"]
-        num_near = sum(
-            np.linalg.norm(where[i] - where[j]) <= 250.0 for i in range(14) for j in range(i)
-        )
-        num_weak = is_weak.tolist().count(True)
-        num_extra = len(is_weak) - num_weak
-        weak.append(100.0 * num_weak / num_near)
-        works.append(100.0 * num_extra / (num_near - num_weak + num_extra))
-        cut_off.append(100.0 * log.is_cut_off[window - 1].tolist().count(True) / 13)
-    shares = {curve.name: curve.values for curve in plots(log)[2].curves}
-    for name, values in expected.items():
-        np.testing.assert_allclose(shares[name], values)
-    shown = column(blocked_replay, "/plots/world/cut_off_from_r4", "Scalars:scalars")
-    np.testing.assert_allclose(shown.flatten().to_numpy(), cut_off)
-
-
-def test_plots_are_the_costs(replay, two_way):
-    shown = column(replay, "/plots/task/cost", "Scalars:scalars").flatten().to_numpy()
-    np.testing.assert_allclose(shown, two_way.log.velocity_variance_m2ps2, rtol=1e-12)
-    values = column(replay, "/plots/age/mean", "Measurements:values").flatten().to_numpy()
-    np.testing.assert_allclose(values, two_way.log.age_mean, rtol=1e-6)

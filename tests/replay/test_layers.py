@@ -8,7 +8,7 @@ from reading import entities
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay import layers
-from swarm_mj.replay.layers import Entity, FlatLayer, ReplayLayer, View, of_others
+from swarm_mj.replay.layer_kinds import Entity, FlatLayer, ReplayLayer, View, of_others
 from swarm_mj.replay.palette import PACKETS
 from swarm_mj.replay.write import write_replay
 

@@ -8,7 +8,7 @@ import pytest
 from mujoco import mjtGeom
 
 from swarm_mj.mission import paper
-from swarm_mj.physics.arenas import OBSTACLE_GROUP
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP
 from swarm_mj.replay.links import (
     DASHES,
     EVERY,

@@ -5,7 +5,7 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.replay import palette, recorder
+from swarm_mj.replay import palette, recorder, replay_size
 from swarm_mj.replay.links import radio_snapshot
 from swarm_mj.replay.recorder import Recorder, moment
 from swarm_mj.simulation.rollout import rollout
@@ -106,7 +106,7 @@ def test_large_flights_keep_every_kth_age_matrix(monkeypatch):
 
 
 def test_of_a_large_team_the_matrix_has_every_kth_robot(monkeypatch):
-    monkeypatch.setattr(recorder, "MAX_MATRIX_ROBOTS", 4)
+    monkeypatch.setattr(replay_size, "MAX_MATRIX_ROBOTS", 4)
     swarm = Swarm(paper("random-walk", num_robots=9, num_windows=6), [0])
     record, seen = Recorder(swarm), []
     for window in rollout(swarm, make_policy("round-robin", swarm.mission)):

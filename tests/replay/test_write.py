@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import rerun.blueprint as rrb
 from reading import colours, column, counts, entities, rows, static
 from rerun.chunk import RrdReader
 
@@ -38,6 +39,16 @@ def test_replays_of_one_kind_share_a_layout_and_others_have_their_own(
     cost = TaskCost(name="distance, in metres", unit="m", value=two_way.log.age_mean)
     write_replay(replace(two_way.log, task_cost=cost), {"seed": 5}, tmp_path / "c.rrd")
     assert kind_of(tmp_path / "c.rrd") not in names
+
+
+def test_a_rerun_without_one_of_our_views_makes_a_layout_of_its_own(two_way, tmp_path, monkeypatch):
+    monkeypatch.delattr(rrb, "EyeControls3D")
+    path = tmp_path / "r.rrd"
+    with pytest.warns(UserWarning, match=r"EyeControls3D.*, so the replay has rerun's own"):
+        write_replay(two_way.log, {"seed": 5}, path)
+    assert RrdReader(path).blueprints() == []
+    assert "/legend/ramp" in entities(path)
+    assert check_replay(path) is None
 
 
 def kind_of(path):

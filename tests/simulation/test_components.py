@@ -21,6 +21,12 @@ def plain(position_m, recipient):
 def maker(mission):
     return object()
 
+def text():
+    return "tdma"
+
+def nothing():
+    return None
+
 def given_three(position_m, recipient, range_m):
     return recipient
 
@@ -60,6 +66,8 @@ def test_a_channel_by_name_takes_no_effects_beside_it():
     [
         ("number", "must be a function, or an object like one, not 7"),
         ("maker", "must be a function, or an object like one, not <"),
+        ("text", "must be a function, or an object like one, not 'tdma'"),
+        ("nothing", "must be a function, or an object like one, not None"),
         ("given_three", r"is called with \(position_m, recipient\), but this one takes"),
     ],
 )

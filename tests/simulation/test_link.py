@@ -78,6 +78,24 @@ def test_what_cannot_be_delivered_is_refused():
         link.deliver(np.full((2, 3, 2), np.nan), silent)
 
 
+@pytest.mark.parametrize("kind", ["complex", "bool", "datetime64[s]", "timedelta64[s]", "str"])
+def test_places_are_numbers(kind):
+    """NumPy makes floats of all of these, of some without a word."""
+    link = swarm_mj.Link(paper(num_robots=3))
+    places = np.zeros((3, 2), dtype=int).astype(kind)
+    with pytest.raises(ValueError, match=r"position_m must be numbers \[m\], not .*; convert them"):
+        link.deliver(places, [True, False, False])
+
+
+def test_who_sends_is_a_truth_or_an_addressee_of_each_robot():
+    link = swarm_mj.Link(paper(num_robots=3))
+    with pytest.raises(ValueError, match=r"wants_to_send must have shape \(1, 3\)"):
+        link.deliver(np.zeros((3, 2)), True)
+    with pytest.raises(ValueError, match="wants_to_send must be an array, or lists of the same"):
+        link.deliver(np.zeros((3, 2)), [[True], [1, 2]])
+    assert link.deliver(np.zeros((3, 2)), np.array([2, 1, 2], dtype=">i4")).tolist() == [0, 0, 0]
+
+
 def test_a_link_needs_no_mujoco():
     code = (
         "import swarm_mj, sys; swarm_mj.Link(swarm_mj.paper()); sys.exit('mujoco' in sys.modules)"

@@ -5,7 +5,8 @@ import pytest
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.costs import COUNTS, WindowCosts, mean_hops, no_packets
+from swarm_mj.protocol.costs import WindowCosts, mean_hops
+from swarm_mj.protocol.packet_counts import COUNTS, no_packets
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 

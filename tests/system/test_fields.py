@@ -2,17 +2,18 @@
 
 import json
 from dataclasses import asdict, dataclass, fields
-from typing import Literal
+from typing import Literal, get_type_hints
 
 import numpy as np
 import pytest
 
+from swarm_mj.system.arguments import check_names
 from swarm_mj.system.fields import (
+    Meaning,
+    MeaningFields,
     about_of,
     above_zero,
     check,
-    check_names,
-    did_you_mean,
     former_names,
     kind_of,
     same_as,
@@ -76,15 +77,6 @@ def test_a_field_like_another_has_its_default_and_range():
         check(Pot(litres=9.0))
 
 
-@pytest.mark.parametrize(
-    ("typed", "meant"),
-    [("windows", "num_windows"), ("robots", "num_robots"), ("num_robot", "num_robots")],
-)
-def test_the_name_that_was_meant_holds_the_word_or_is_like_it(typed, meant):
-    known = ["window_s", "num_windows", "num_robots", "noise_dbm"]
-    assert did_you_mean(typed, known) == f"; did you mean {meant}?"
-
-
 @dataclass(frozen=True, kw_only=True)
 class Oven:
     """Settings of which some count with others, and some were called otherwise."""
@@ -129,3 +121,9 @@ def test_former_names_lead_to_the_present_ones():
     assert former_names(Kettle, Oven) == former
     with pytest.raises(TypeError, match="argument 'warmth'; did you mean heat"):
         check_names("Oven", ["warmth"], ["light", "heat"], former)
+
+
+def test_type_checkers_are_told_of_every_field_of_a_meaning():
+    declared = {spec.name: spec.type for spec in fields(Meaning)}
+    assert get_type_hints(MeaningFields) == {n: k for n, k in declared.items() if n != "help"}
+    assert not MeaningFields.__required_keys__

@@ -17,6 +17,7 @@ from matplotlib.text import Text
 
 from swarm_mj.policies.about import Look
 from swarm_mj.policies.registry import LISTED, about_of
+from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.writing import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
@@ -127,6 +128,7 @@ def save(figure: Figure, path: Path) -> None:
 
     Raises:
         OSError: The file cannot be written.
+        KeyboardInterrupt: Ctrl-C was pressed while the figure was drawn.
     """
     kind = path.suffix.removeprefix(".").lower()
     field, undated = METADATA[kind]
@@ -136,4 +138,5 @@ def save(figure: Figure, path: Path) -> None:
         metadata = {field: cast(Text, caption).get_text(), **undated}
         colour = figure.get_facecolor()
         figure.savefig(drawn, format=kind, facecolor=colour, metadata=metadata)
+    raise_if_interrupted()  # matplotlib swallows it while it loads
     write_bytes(path, drawn.getbuffer())

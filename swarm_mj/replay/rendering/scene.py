@@ -15,7 +15,7 @@ from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
 from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvScene
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.arenas import obstacle_geoms
+from swarm_mj.physics.obstacles import obstacle_geoms
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.rendering import markers

@@ -1,0 +1,68 @@
+"""The start of missions: where robots begin, and the packets that a policy wants."""
+
+from dataclasses import dataclass
+from functools import partial
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from swarm_mj.mission import Mission
+from swarm_mj.mission.placement import connected_positions
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
+from swarm_mj.policies.policy import Policy, check_parameters
+from swarm_mj.protocol.packets import Packet
+from swarm_mj.radio.composed import ComposedChannel
+from swarm_mj.radio.obstruction import blocked
+from swarm_mj.system.arguments import check_kind, name_of
+
+MAX_DRAWN_AT_ONCE = 1000  # robots of a team that is drawn anew as a whole until it is connected
+
+
+@dataclass(frozen=True)
+class Starts:
+    """Where the robots of missions may begin."""
+
+    mission: Mission
+    obstacles: Obstacles | None
+    channel: ComposedChannel | None  # that says who is connected; None: distances say it
+
+    def positions(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
+        """Draw where mission b's robots begin, connected under their channel where it can say."""
+        mission = self.mission
+        channel = self.channel
+        has_obstacles = self.obstacles is not None
+        return connected_positions(
+            num_robots=mission.num_robots,
+            half_side_m=mission.half_side_m,
+            range_m=mission.range_m,
+            rng=rng,
+            largest_part_at=partial(channel.largest_part, mission=b) if channel else None,
+            is_blocked_at=self.is_blocked if has_obstacles or mission.collide else None,
+            keeps_largest=has_obstacles or mission.num_robots > MAX_DRAWN_AT_ONCE,
+        )
+
+    def is_blocked(self, position_m: Float[np.ndarray, "N 2"]) -> Bool[np.ndarray, "N"]:
+        """Return which robots would touch an obstacle there, or another robot if they collide."""
+        is_blocked = np.zeros(len(position_m), dtype=bool)
+        if self.obstacles is not None:
+            is_blocked = blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, self.obstacles)
+        if self.mission.collide:
+            apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
+            overlaps = np.tril(apart_m < 2.0 * ROBOT_RADIUS_M, k=-1)  # the first one may stay
+            is_blocked |= np.any(overlaps, axis=1)
+        return is_blocked
+
+
+def packet_by(policy: Policy, mission: Mission) -> Packet:
+    """Return what a policy's packets hold.
+
+    Raises:
+        ValueError: It never fits into a slot, or is no packet.
+        TypeError: It is no policy, or says its parameters wrongly.
+    """
+    check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
+    check_parameters(policy)
+    packet = policy.packet(mission)
+    if not isinstance(packet, Packet):
+        raise ValueError(f"packet() of {name_of(policy)} must return a Packet, not {packet!r:.80}")
+    return packet
