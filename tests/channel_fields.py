@@ -17,11 +17,14 @@ def other_values(name):
     about = about_of(spec)
     if about.choices:
         return [choice for choice in about.choices if choice != spec.default]
-    return [0.5 * (about.low + about.high)]
+    middle = 0.5 * (about.low + about.high)
+    return [int(middle) if isinstance(spec.default, int) else middle]
 
 
 def counting(name):
-    """The fields of a mission in which a number counts."""
+    """The fields of a mission in which a number counts, and in which `other_values` are allowed."""
+    if name == "sensing_dbm":
+        return {"noise_dbm": -100.0}  # which hides no power of those
     switch = about_of(SPECS[name]).counts_with
     if switch is None:
         return {}

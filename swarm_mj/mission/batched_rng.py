@@ -30,6 +30,7 @@ class Streams(NamedTuple):
     failures: list[np.random.Generator]
     channel: list[np.random.Generator]
     localisation: list[np.random.Generator]
+    sensing: list[np.random.Generator]
 
 
 def streams_of(seeds: Sequence[int]) -> Streams:

@@ -63,3 +63,20 @@ class Mission(
                 "exact physics knows no collisions; choose physics contact, or arena open (it is "
                 f"{self.arena}) whose robots pass through each other"
             )
+        self._check_sensing()
+
+    def _check_sensing(self) -> None:
+        """Raise ValueError for what no receiver senses, or minislots that leave no slot."""
+        floor_dbm = self.sensing_floor_dbm
+        if self.sensing_dbm is not None and self.sensing_dbm < floor_dbm:
+            raise ValueError(
+                f"sensing threshold must be at least {floor_dbm:g} dBm, below which the noise of "
+                f"{self.noise_dbm:g} dBm hides a preamble of {self.sensing_gain_db:g} dB gain, not "
+                f"{self.sensing_dbm:g}; choose that or more, or a larger sensing gain"
+            )
+        if self.contention_s >= self.slot_s:
+            raise ValueError(
+                f"{self.minislots} minislots of {self.minislot_us:g} µs take "
+                f"{1e3 * self.contention_s:g} ms, but a slot has {1e3 * self.slot_s:g} ms; choose "
+                "fewer or shorter ones"
+            )

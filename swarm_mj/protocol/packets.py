@@ -116,28 +116,38 @@ def _symmetric(name: str, bits: int, most: float, unit: str) -> PacketField:
     return PacketField(name=name, bits=bits, count=2, low=low, step=step, unit=unit)
 
 
-def slot_bytes(mission: Mission) -> int | None:
-    """Return the bytes of a slot at the mission's bit rate; None if it holds any packet."""
+def slot_bytes(mission: Mission, taken_s: float = 0.0) -> int | None:
+    """Return the bytes of a slot at the mission's bit rate; None if it holds any packet.
+
+    What is taken of it comes before the packet, such as minislots [s].
+    """
     if mission.bit_rate is None:
         return None
-    bits = mission.bit_rate * mission.window_s * SLOT_WINDOWS
+    bits = mission.bit_rate * (mission.window_s * SLOT_WINDOWS - taken_s)
     return math.floor(round(bits / BITS_PER_BYTE, 6))
 
 
-def fits(packet: Packet, mission: Mission) -> bool:
-    """Return whether a slot of the mission holds a packet."""
-    capacity = slot_bytes(mission)
+def fits(packet: Packet, mission: Mission, taken_s: float = 0.0) -> bool:
+    """Return whether a slot of the mission, or what is left of it, holds a packet."""
+    capacity = slot_bytes(mission, taken_s)
     return capacity is None or packet.num_bytes <= capacity
 
 
 def check_fits(
-    what: str, packet: Packet, mission: Mission, *, why: str = "", otherwise: str = ""
+    what: str,
+    packet: Packet,
+    mission: Mission,
+    *,
+    why: str = "",
+    otherwise: str = "",
+    taken_s: float = 0.0,
 ) -> None:
-    """Raise ValueError unless a slot holds a packet; the rest completes the message."""
+    """Raise ValueError unless a slot holds a packet; the texts complete the message."""
     rate = mission.bit_rate
-    capacity = slot_bytes(mission)
+    capacity = slot_bytes(mission, taken_s)
     if rate is not None and capacity is not None and packet.num_bytes > capacity:
-        needed = packet.num_bytes * BITS_PER_BYTE / (mission.window_s * SLOT_WINDOWS)
+        left_s = mission.window_s * SLOT_WINDOWS - taken_s
+        needed = packet.num_bytes * BITS_PER_BYTE / left_s
         least = math.ceil(round(needed, 6))
         raise ValueError(
             f"{what} {packet.num_bytes:,} bytes{why}, but a slot holds {capacity:,} bytes at "
@@ -145,13 +155,17 @@ def check_fits(
         )
 
 
-def fitting(packet: Packet, mission: Mission, policy: str) -> Packet:
-    """Return a packet with the entries that a slot holds; ValueError if it holds not even one."""
-    capacity = slot_bytes(mission)
-    if capacity is None or fits(packet, mission):
+def fitting(packet: Packet, mission: Mission, policy: str, taken_s: float = 0.0) -> Packet:
+    """Return a packet with the entries that a slot holds; ValueError if it holds not even one.
+
+    What is taken of a slot comes before the packet [s].
+    """
+    capacity = slot_bytes(mission, taken_s)
+    if capacity is None or fits(packet, mission, taken_s):
         return packet
     least = replace(packet, num_entries=1)
-    check_fits(f"packets of {policy} need", least, mission, why=" for a single entry")
+    needs = f"packets of {policy} need"
+    check_fits(needs, least, mission, why=" for a single entry", taken_s=taken_s)
     spare = BITS_PER_BYTE * (capacity - least.num_bytes)
     return replace(packet, num_entries=1 + spare // _num_bits(packet.entry))
 

@@ -19,7 +19,7 @@ from swarm_mj.radio.effects import Effect, HighPower, Obstruction, effects_of, m
 from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
-from swarm_mj.radio.power_law import PowerLaw, free_space_law
+from swarm_mj.radio.power_law import PowerLaw, free_space_law, powers_between
 from swarm_mj.system.decibels import from_db
 
 
@@ -64,12 +64,21 @@ class TrueLinks:
     radio: FreeSpaceRadio
     channel: ComposedChannel | None = None  # None: in free space, or a user's own, which is unknown
 
+    def mean_powers_mw(
+        self, position_m: Float[np.ndarray, "N 2"], mission: int
+    ) -> Float[np.ndarray, "N N"]:
+        """Return the power of each robot of a mission at each other before fades [mW]."""
+        if self.channel is None:
+            law = free_space_law(self.radio.received_at_1_m_mw, len(position_m))
+            return powers_between(position_m, law)
+        return self.channel.mean_powers_mw(position_m, mission)
+
     def links(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> Links:
         """Return the links between true positions of one mission, which has its own shadowing."""
         links = links_between(self.radio, position_m)
         if self.channel is None:
             return links
-        powers_mw = self.channel.mean_powers_mw(position_m, mission)
+        powers_mw = self.mean_powers_mw(position_m, mission)
         links = links._replace(received_mw=powers_mw, interference_mw=powers_mw)
         return _with_chances(links, self.channel.reception, 0.0)
 

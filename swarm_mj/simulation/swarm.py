@@ -6,7 +6,7 @@ from functools import partial
 from numbers import Integral
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from swarm_mj.control.motion import Controller, controller_of, costed, initial_velocity
 from swarm_mj.mission import Mission
@@ -15,6 +15,7 @@ from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
+from swarm_mj.policies.carrier_sense import SensingPolicy
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
 from swarm_mj.protocol.checks import checked_robots
@@ -24,6 +25,7 @@ from swarm_mj.protocol.talk import talk_over
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews, Phase
 from swarm_mj.protocol.window_protocols import RequestResponse, WindowProtocol
+from swarm_mj.radio.carrier_sensing import CarrierSensing, Contention
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.simulation.components import Components
@@ -98,6 +100,7 @@ class Swarm:
         self.channel = radio.channel
         self.belief = radio.belief
         self.truth = radio.truth
+        self._sensing = CarrierSensing(mission, radio.truth)
 
         is_tasks = own.controller is None
         self.controller: Controller = controller_of(mission) if is_tasks else own.controller
@@ -131,6 +134,7 @@ class Swarm:
             self.controller.start(num_robots, self._rngs.motion)
         if isinstance(self.channel, Started):
             self.channel.start(num_robots, self._rngs.channel)
+        self._sensing.start(num_robots, self._rngs.sensing)
 
     def _place_robots(self) -> None:
         """Draw where the robots begin, how fast, who will fail, and errors of localisation."""
@@ -206,6 +210,8 @@ class Swarm:
             policy.inform(self.belief)
         else:
             raise TypeError("a policy must be a DecentralisedPolicy or a CentralisedPolicy")
+        if isinstance(policy, SensingPolicy):
+            policy.listen(self._sense)
         policy.start(self.mission.num_robots, self._rngs.policy)
         self._give_room(packet.num_entries)
         self._policy = policy
@@ -230,6 +236,10 @@ class Swarm:
         if isinstance(policy, CentralisedPolicy):
             return policy.recipients(views, self._states_for(is_trusted))
         return policy.recipients(views)
+
+    def _sense(self, contention: Contention) -> Bool[np.ndarray, "B N"]:
+        """Return who finds the channel idle, and so transmits."""
+        return self._sensing.transmit(contention, self.states)
 
     def move(self) -> RobotStates:
         """Move the robots through one window, by their controller and the physics.

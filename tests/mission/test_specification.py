@@ -129,7 +129,11 @@ NOTHING_UNLESS_ASKED = {
     "clock_drift_ppm",
     "map_offset_m",
     "position_noise_m",
+    "sensing_miss",
+    "sensing_false_alarm",
 }
+# The noise hides what is far below it.
+GOES_WITH = {"sensing_dbm": {"noise_dbm": -200.0}}
 
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
@@ -148,7 +152,34 @@ def test_every_quantity_names_its_unit_and_source(spec):
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_the_ends_of_a_range_are_allowed(spec, end):
     value = kind_of(spec)(getattr(about_of(spec), end))
-    assert getattr(Mission(**{spec.name: value}), spec.name) == value
+    given = GOES_WITH.get(spec.name, {}) | {spec.name: value}
+    assert getattr(Mission(**given), spec.name) == value
+
+
+@pytest.mark.parametrize(
+    ("given", "floor_dbm"),
+    [
+        ({}, -57.0),
+        ({"sensing_gain_db": 0.0}, -47.0),
+        ({"noise_dbm": -94.0, "sensing_gain_db": 12.5}, -103.5),
+    ],
+)
+def test_robots_sense_down_to_3_db_over_the_noise_less_the_gain(given, floor_dbm):
+    assert paper(**given).sensing_floor_dbm == floor_dbm
+    assert paper(sensing_dbm=floor_dbm, **given).sensing_dbm == floor_dbm
+    with pytest.raises(ValueError, match=r"^sensing threshold must be") as refusal:
+        paper(sensing_dbm=floor_dbm - 0.5, **given)
+    said = str(refusal.value)
+    assert f"at least {floor_dbm:g} dBm" in said
+    assert f"not {floor_dbm - 0.5:g}; choose that or more, or a larger sensing gain" in said
+
+
+def test_minislots_leave_some_of_a_slot():
+    """64 of 20 µs take 1.28 ms of 50; 100 of 500 µs would take all of it."""
+    assert paper().contention_s == pytest.approx(1.28e-3)
+    with pytest.raises(ValueError, match="100 minislots of 500 µs take 50 ms, but a slot has 50"):
+        paper(minislots=100, minislot_us=500.0)
+    assert paper(minislots=99, minislot_us=500.0).contention_s == pytest.approx(49.5e-3)
 
 
 @pytest.mark.parametrize(

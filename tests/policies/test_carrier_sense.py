@@ -1,4 +1,4 @@
-"""Carrier sensing: who holds back for whom, hidden terminals, and how often two begin at once."""
+"""Policies that sense: when their robots listen, and how often two begin at once."""
 
 import copy
 import math
@@ -6,129 +6,161 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
 
 from swarm_mj.mission import paper
-from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.carrier_sense import (
-    DRAWN_MINISLOTS,
-    MINISLOTS,
+    DRAWN_SHARE,
+    LEAST_NEWS,
+    NUM_TURNS,
+    TURN_EVERY,
     AgeGainCsma,
     CarrierSense,
-    beginners,
+    SensingPolicy,
     covered_share,
-    sensed_dbm,
 )
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
 from swarm_mj.protocol.window import LocalViews, Phase
-from swarm_mj.radio.mission_radio import TrueLinks, radio_of
+from swarm_mj.radio.carrier_sensing import Contention
 from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("stationary")
-SENSED_MW = 10**-5.7
+TURN = TURN_EVERY - 1  # the first slot of a mission that is a turn
 
 
-@pytest.mark.parametrize(("noise_dbm", "expected"), [(-50.0, -57.0), (-94.0, -101.0)])
-def test_robots_sense_two_and_a_half_times_as_far_as_they_decode(noise_dbm, expected):
-    mission = paper("stationary", noise_dbm=noise_dbm)
-    assert sensed_dbm(mission) == expected
-    radio = radio_of(mission)
-    sensed_m = np.sqrt(radio.received_at_1_m_mw / 10 ** (expected / 10))
-    assert sensed_m == pytest.approx(2.5 * mission.range_m, rel=0.01)
-    assert sensed_dbm(paper("stationary", sensing_dbm=-60.0)) == -60.0
+class Alone:
+    """A radio over which nobody senses anybody; it remembers what it was asked."""
+
+    def __call__(self, contention):
+        self.minislot, self.busy_dbm = contention
+        return np.isfinite(contention.minislot)
 
 
-def begun(minislot, power_mw, sensed_mw=1.0, is_active=None):
-    """The robots that transmit, by name of their place in the list."""
-    minislot = np.asarray(minislot, dtype=float)
-    active = np.ones(len(minislot), dtype=bool) if is_active is None else np.array(is_active)
-    power_mw = np.asarray(power_mw, dtype=float)
-    return list(np.flatnonzero(beginners(minislot, active, power_mw, sensed_mw)))
-
-
-def in_line(num_robots, reach=1):
-    """Robots in a line that each sense those at most `reach` places away."""
-    place = np.arange(num_robots)
-    return (abs(place[:, None] - place) <= reach) * 2.0
-
-
-def test_a_robot_holds_back_for_those_it_senses_only():
-    assert begun([0, 1, 2], in_line(3)) == [0, 2]  # hidden terminals: 0 and 2 both reach 1
-    assert begun([1, 0, 2], in_line(3)) == [1]
-    assert begun([0, 1, 2, 3, 4], in_line(5, reach=2)) == [0, 3]
-
-
-def test_robots_of_one_minislot_do_not_sense_each_other():
-    assert begun([3, 3, 4], in_line(3)) == [0, 1]
-
-
-def test_a_robot_that_held_back_silences_nobody():
-    assert begun([0, 1, 2, 3], in_line(4)) == [0, 2]
-
-
-def test_a_robot_that_failed_neither_transmits_nor_is_sensed():
-    assert begun([0, 1, 2], in_line(3), is_active=[False, True, True]) == [1]
-
-
-def test_power_that_is_just_sensed_is_busy_and_powers_add_up():
-    power_mw = np.zeros((3, 3))
-    power_mw[0, 2] = power_mw[1, 2] = 0.5
-    assert begun([0, 1, 2], power_mw) == [0, 1]
-    assert begun([0, 1, 2], power_mw, sensed_mw=1.01) == [0, 1, 2]
-
-
-@given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(2, 12))
-def test_who_transmits_is_who_heard_too_little_before(seed, num_robots):
-    """The rule read backwards: a robot transmits if, and only if, those before it are too weak."""
-    rng = np.random.default_rng(seed)
-    minislot = rng.integers(0, 5, num_robots).astype(float)
-    power_mw = rng.exponential(1.0, (num_robots, num_robots))
-    found = begun(minislot, power_mw, 1.5)
-    for j in range(num_robots):
-        earlier_mw = sum(power_mw[i, j] for i in found if minislot[i] < minislot[j])
-        assert (j in found) == (earlier_mw < 1.5)
-
-
-def started(probability, num_robots, num_missions=1):
-    policy = CarrierSense(probability, -57.0)
-    policy.inform(TrueLinks(radio=radio_of(MISSION)))
-    policy.start(num_robots, [np.random.default_rng((3, b)) for b in range(num_missions)])
+def started(policy, num_robots, sensing=None):
+    policy.listen(sensing or Alone())
+    policy.start(num_robots, [np.random.default_rng(5)])
     return policy
 
 
-def slots(probability, position_m, num_slots):
-    """Who transmits [slot, robot]."""
-    position_m = np.array([position_m], dtype=float)
-    num_robots = position_m.shape[1]
-    policy, buffers = started(probability, num_robots), empty_buffers(1, num_robots)
-    views = LocalViews(buffers=buffers, now=np.zeros(1), phases=())
-    states = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
-    return np.stack([policy.recipients(views, states)[0] == BROADCAST for _ in range(num_slots)])
+def views_of(timestamp, position_m, heard, now=10.0, sent=()):
+    """One mission's views: T, where all are and everyone believes all are, whom each heard."""
+    num_robots = len(position_m)
+    buffers = empty_buffers(1, num_robots)
+    buffers.timestamp[0] = timestamp
+    buffers.position_m[0] = np.broadcast_to(position_m, (num_robots, num_robots, 2))
+    recipient = np.arange(num_robots)
+    recipient[list(sent)] = BROADCAST
+    phases = (Phase(recipient=recipient[None], heard=np.array([heard])),)
+    return LocalViews(buffers=buffers, now=np.full(1, now), phases=phases)
+
+
+def drawn(probability, num_slots, num_robots=2):
+    """The minislots that robots draw [slot, robot]."""
+    policy = started(CarrierSense(probability, -57.0), num_robots)
+    views = views_of(0.0, np.zeros((num_robots, 2)), range(num_robots))
+    return np.stack([policy.contend(views).minislot[0] for _ in range(num_slots)])
 
 
 @pytest.mark.parametrize("probability", [0.1, 0.6])
-def test_two_neighbours_begin_together_as_geometric_draws_do(probability):
-    """The sum of p² (1 - p)^2k over minislots k is p / (2 - p); else one of them transmits."""
-    sent = slots(probability, [[0, 0], [100, 0]], 3000)
+def test_minislots_are_drawn_as_geometric_numbers(probability):
+    """The share of minislot m is p (1 - p)^m; two are equal in p / (2 - p) of all slots."""
+    minislot = drawn(probability, 6000)
+    for m in range(4):
+        expected = probability * (1 - probability) ** m
+        error = 5 * math.sqrt(expected * (1 - expected) / minislot.size)
+        assert np.mean(minislot == m) == pytest.approx(expected, abs=error)
     expected = probability / (2 - probability)
-    error = 5 * math.sqrt(expected * (1 - expected) / 3000)
-    assert np.mean(np.all(sent, axis=1)) == pytest.approx(expected, abs=error)
-    assert np.all(np.any(sent, axis=1))
+    error = 5 * math.sqrt(expected * (1 - expected) / len(minislot))
+    assert np.mean(minislot[:, 0] == minislot[:, 1]) == pytest.approx(expected, abs=error)
 
 
 def test_robots_that_never_begin_or_always():
-    assert not np.any(slots(0.0, [[0, 0], [100, 0]], 20))
-    assert np.all(slots(1.0, [[0, 0], [100, 0]], 20))
+    assert np.all(np.isinf(drawn(0.0, 20)))
+    assert not np.any(drawn(1.0, 20))
 
 
-def test_the_default_threshold_is_sensed_at_two_and_a_half_times_the_range():
-    sensed_m = radio_of(MISSION).received_at_1_m_mw / SENSED_MW
-    assert math.sqrt(sensed_m) == pytest.approx(2.5 * MISSION.range_m, rel=0.01)
-    apart_m = 2.4 * MISSION.range_m
-    assert np.mean(np.all(slots(0.01, [[0, 0], [apart_m, 0]], 500), axis=1)) < 0.05
-    assert np.all(slots(0.01, [[0, 0], [apart_m * 1.1, 0]], 20))
+def test_a_robot_that_draws_no_minislot_of_the_slot_is_silent():
+    """Of two that do not sense each other, each begins in 1 - 0.98^32 of all slots: 0.476."""
+    mission = paper("stationary", num_robots=2, minislots=32, sensing_miss=1.0)
+    swarm = Swarm(mission, range(200))
+    policy = make_policy("csma", mission, 0.02)
+    swarm.start(policy)
+    share = np.mean([swarm.decide() == BROADCAST for _ in range(20)])
+    assert share == pytest.approx(0.476, abs=5 * math.sqrt(0.25 / 8000))
+
+
+@pytest.mark.parametrize("name", ["csma", "age-gain-csma"])
+def test_robots_hold_back_from_the_missions_power(name):
+    for busy_dbm in (-57.0, -50.0):
+        mission = paper("stationary", num_robots=3, sensing_dbm=busy_dbm)
+        radio = Alone()
+        policy = started(make_policy(name, mission), 3, radio)
+        policy.recipients(views_of(np.eye(3), np.zeros((3, 2)), range(3), now=0.0))
+        assert radio.busy_dbm.tolist() == [[busy_dbm] * 3]
+
+
+@pytest.mark.parametrize("name", ["csma", "age-gain-csma"])
+def test_a_policy_learns_of_the_truth_who_transmits_and_nothing_else(name):
+    """Its robots transmit if the radio says so, and it is handed no true links."""
+
+    def only_the_second(_):
+        return np.array([[False, True, False]])
+
+    policy = started(make_policy(name, MISSION), 3, only_the_second)
+    views = views_of(np.eye(3), np.zeros((3, 2)), range(3))
+    assert policy.recipients(views).tolist() == [[0, BROADCAST, 2]]
+    swarm = Swarm(paper("stationary", num_robots=3), [1])
+    swarm.start(policy)
+    assert not hasattr(policy, "_truth")
+
+
+def test_what_others_sense_by_the_true_places_reaches_no_policy():
+    """Teams that are alike but for where they truly are contend alike until they have talked."""
+
+    class Seen(CarrierSense):
+        def contend(self, views):
+            contention = super().contend(views)
+            asked.append(contention.minislot.tolist())
+            return contention
+
+    mission = paper("stationary", num_robots=10)
+    sent = []
+    asked = []
+    for scale in (1.0, 30.0):
+        swarm = Swarm(mission, [1])
+        swarm._physics.place(scale * swarm.states.position_m, swarm.states.velocity_mps)
+        swarm.start(Seen(0.1, -57.0))
+        sent.append(np.sum(swarm.decide() == BROADCAST))
+    assert asked[0] == asked[1]
+    assert sent[0] < sent[1]  # far apart, nobody holds back
+
+
+class InOrder(SensingPolicy):
+    """Robots go by their numbers, and hold back for all that they sense."""
+
+    def contend(self, views):
+        minislot = views.silence.astype(float)
+        return Contention(minislot, np.full_like(minislot, -57.0))
+
+
+def test_a_policy_of_ones_own_may_sense():
+    swarm = Swarm(paper("stationary", num_robots=5, range_ratio=1.0), [1, 2])
+    for _ in range(3):
+        packets = swarm.step(InOrder()).packets
+        assert packets.sent.tolist() == [2, 2]  # the first robot, in both slots
+
+
+@pytest.mark.parametrize(("minislot_us", "entries"), [(0.0, 40), (20.0, 38), (100.0, 34)])
+def test_minislots_take_their_time_from_packets(minislot_us, entries):
+    """A slot of 367 bytes; 64 of 20 µs take 9.4 bytes of it, and leave 357: 7 and 38 times 9."""
+    mission = paper(bit_rate=367 * 160.0, minislot_us=minislot_us)
+    for name in ("csma", "age-gain-csma"):
+        assert make_policy(name, mission).packet(mission).num_entries == entries
+    assert make_policy("tdma", mission).packet(mission).num_entries == 40
+    short = paper(bit_rate=16 * 160.0, minislot_us=minislot_us)
+    if minislot_us > 0.0:
+        with pytest.raises(ValueError, match="16 bytes for a single entry, but a slot holds 1"):
+            make_policy("csma", short).packet(short)
 
 
 def test_most_packets_of_robots_that_sense_are_heard():
@@ -140,17 +172,6 @@ def test_most_packets_of_robots_that_sense_are_heard():
         packets = [swarm.step(policy).packets for _ in range(60)]
         shares[name] = sum(p.heard.sum() for p in packets) / sum(p.sent.sum() for p in packets)
     assert shares["csma"] > 0.8 > shares["aloha"]
-
-
-def views_of(timestamp, position_m, heard, now=10.0):
-    """One mission's views: T, where all are and everyone believes all are, and whom each heard."""
-    num_robots = len(position_m)
-    buffers = empty_buffers(1, num_robots)
-    buffers.timestamp[0] = timestamp
-    buffers.position_m[0] = np.broadcast_to(position_m, (num_robots, num_robots, 2))
-    heard = np.array([heard])
-    phases = (Phase(recipient=np.full_like(heard, BROADCAST), heard=heard),)
-    return LocalViews(buffers=buffers, now=np.full(1, now), phases=phases)
 
 
 @pytest.mark.parametrize("ranges", [0.0, 0.4, 1.0, 1.9, 3.0])
@@ -166,19 +187,61 @@ def test_the_share_of_a_range_that_the_sender_covers_is_that_of_points_drawn_in_
     assert not np.any(covered_share(before, MISSION.range_m))
 
 
-def age_gain_csma(num_robots, mission=MISSION):
-    policy = AgeGainCsma(mission)
-    policy.inform(TrueLinks(radio=radio_of(mission)))
-    policy.start(num_robots, [np.random.default_rng(5)])
-    return policy
+class Undrawn:
+    """Draws that are all 0."""
+
+    def __init__(self, num_robots):
+        self._num_robots = num_robots
+
+    def next(self):
+        return np.zeros((1, self._num_robots))
 
 
-def test_twice_the_news_begins_earlier_and_who_has_none_does_not_begin():
-    timestamp = np.diag([0.0, 2.0, 4.0, 8.0])
-    views = views_of(timestamp, np.zeros((4, 2)), range(4))
-    (minislot,) = age_gain_csma(4).minislots(views)
+def age_gain_csma(num_robots, mission=MISSION, sensing=None):
+    return started(AgeGainCsma(mission), num_robots, sensing)
+
+
+@pytest.mark.parametrize("minislots", [64, 256])
+def test_twice_the_news_begins_earlier_and_who_has_little_does_not_begin(minislots):
+    """News of 1, 2 and 4 windows; the first robot has less than `LEAST_NEWS`.
+
+    From that to 4 windows, which begin first in a team of 4, news doubles 3.32 times.
+    """
+    assert LEAST_NEWS == 0.4
+    timestamp = 4.0 * np.diag([0.3, 1.0, 2.0, 4.0])
+    views = views_of(timestamp, np.zeros((4, 2)), range(4), now=200.0)
+    policy = age_gain_csma(4, paper("stationary", minislots=minislots))
+    (minislot,) = policy.contend(views).minislot
     assert np.isinf(minislot[0])
-    np.testing.assert_allclose(-np.diff(minislot[1:]), MINISLOTS, atol=DRAWN_MINISLOTS)
+    most_drawn = DRAWN_SHARE * minislots + 1.0
+    np.testing.assert_allclose(-np.diff(minislot[1:]), minislots / 3.32, atol=most_drawn)
+
+
+def test_much_news_begins_first_and_little_news_last():
+    """Three robots with news of 3 windows and more begin in the first minislots, as is drawn."""
+    timestamp = 3.0 * np.diag([3.0, 100.0, LEAST_NEWS + 1e-9])
+    views = views_of(timestamp, np.zeros((3, 2)), range(3), now=200.0)
+    for seed in range(20):
+        policy = age_gain_csma(3)
+        policy.start(3, [np.random.default_rng(seed)])
+        (minislot,) = policy.contend(views).minislot
+        assert 0 <= minislot[0] < 4
+        assert 0 <= minislot[1] < 4
+        assert minislot[2] == 63
+
+
+@pytest.mark.parametrize(("num_robots", "first"), [(20, 20.0), (40, 40.0), (90, 40.0)])
+def test_news_of_as_many_windows_as_robots_but_at_most_40_begins_first(num_robots, first):
+    """A fifth less begins later, in 1024 minislots that are enough to see it."""
+    news = np.full(num_robots, first)
+    news[1] = 0.8 * first
+    timestamp = num_robots * np.diag(news)
+    nowhere = np.zeros((num_robots, 2))
+    policy = age_gain_csma(num_robots, paper("stationary", minislots=1024))
+    policy._stream = Undrawn(num_robots)
+    (minislot,) = policy.contend(views_of(timestamp, nowhere, range(num_robots))).minislot
+    assert minislot[0] == 0
+    assert minislot[1] > 0
 
 
 def test_news_that_neighbours_have_heard_with_one_count_less():
@@ -186,28 +249,39 @@ def test_news_that_neighbours_have_heard_with_one_count_less():
     timestamp = np.array([[9, 0, 0], [9, 0.5, 0], [9, 0, 0.5]])
     edge = [[0.0, 0.0], [0.0, 0.0], [MISSION.range_m, 0.0]]
     policy = age_gain_csma(3)
-    policy.minislots(views_of(timestamp, edge, [0, 0, 0]))
+    policy.contend(views_of(timestamp, edge, [0, 0, 0]))
     assert policy._news[0, 0] == 3.0
     assert policy._news[0, 1] == pytest.approx(0.0)
     assert policy._news[0, 2] == pytest.approx(9.5 / 3 * (1 - 0.391), abs=1e-3)
 
 
 def test_who_has_transmitted_has_no_news_until_it_learns_something():
-    policy, place = age_gain_csma(2), np.array([[[0.0, 0.0], [100.0, 0.0]]])
-    states = RobotStates(position_m=place, velocity_mps=np.zeros_like(place))
-    views = views_of(np.diag([1.0, 8.0]), place[0], [0, 1])
-    turns = [(policy.recipients(views, states)[0] == BROADCAST).tolist() for _ in range(3)]
-    assert turns == [[False, True], [True, False], [False, False]]
+    """Means of T rise by 2 and 4 windows, and then by none; the second robot transmits between."""
+    policy, place = age_gain_csma(2), np.zeros((2, 2))
+    timestamp = np.diag([4.0, 8.0])
+    policy.contend(views_of(timestamp, place, [0, 1]))
+    assert policy._news.tolist() == [[2.0, 4.0]]
+    policy.contend(views_of(timestamp, place, [0, 1], sent=[1]))
+    assert policy._news.tolist() == [[2.0, 0.0]]
+    policy.contend(views_of(timestamp + np.diag([0.0, 1.0]), place, [0, 1]))
+    assert policy._news.tolist() == [[2.0, 0.5]]
 
 
-@pytest.mark.parametrize(("slot", "ranges"), [(0, 2.0), (1, 2.5), (2, 3.15), (3, 4.0), (4, 2.0)])
-def test_two_robots_transmit_together_if_they_do_not_sense_each_other_in_that_slot(slot, ranges):
-    for factor, num_senders in ((0.98, 1), (1.02, 2)):
-        place = np.array([[[0.0, 0.0], [factor * ranges * MISSION.range_m, 0.0]]])
-        states = RobotStates(position_m=place, velocity_mps=np.zeros_like(place))
-        views = views_of(np.diag([8.0, 1.0]), place[0], [0, 1], now=slot / 2)
-        recipient = age_gain_csma(2).recipients(views, states)
-        assert np.sum(recipient == BROADCAST) == num_senders
+@pytest.mark.parametrize(
+    ("num_robots", "turn", "owners"),
+    [(3, 0, [0]), (3, 4, [1]), (40, 39, [39]), (90, 1, [1, 41, 81]), (90, 79, [39, 79])],
+)
+def test_in_each_fifth_slot_the_owner_of_the_turn_transmits(num_robots, turn, owners):
+    assert (TURN_EVERY, NUM_TURNS) == (5, 40)
+    radio = Alone()
+    policy = age_gain_csma(num_robots, sensing=radio)
+    now = (5 * turn + 4) / 2  # the turn's slot begins
+    nowhere = np.zeros((num_robots, 2))
+    recipient = policy.recipients(views_of(9.0, nowhere, range(num_robots), now=now))
+    assert np.flatnonzero(recipient[0] == BROADCAST).tolist() == owners
+    assert np.all(np.isinf(radio.busy_dbm))  # whatever it senses
+    recipient = policy.recipients(views_of(9.0, nowhere, range(num_robots), now=now + 0.5))
+    assert np.all(recipient == BROADCAST)  # all have news, and nobody senses the others
 
 
 def test_a_robot_begins_by_what_has_reached_it_alone():
@@ -217,19 +291,20 @@ def test_a_robot_begins_by_what_has_reached_it_alone():
     others = np.arange(20) != 5
 
     class Doubted(AgeGainCsma):
-        def minislots(self, views):
+        def contend(self, views):
             buffers, phases = copy.deepcopy((views.buffers, views.phases))
             buffers.timestamp[:, others] += rng.uniform(0, 9, (1, 19, 20))
             buffers.position_m[:, others] = rng.uniform(-900, 900, (1, 19, 20, 2))
             for phase in phases:
                 phase.heard[:, others] = rng.integers(0, 20, (1, 19))
-            # Both draw the same numbers, and know who was silent.
+                phase.recipient[:, others] = rng.integers(0, 20, (1, 19))
+            # Both draw the same numbers.
             other._news[...], other._known[...] = self._news, self._known
             other._stream = copy.deepcopy(self._stream)
-            again = other.minislots(replace(views, buffers=buffers, phases=phases))
-            minislot = super().minislots(views)
-            seen.append((minislot[0, 5], again[0, 5]))
-            return minislot
+            again = other.contend(replace(views, buffers=buffers, phases=phases))
+            contention = super().contend(views)
+            seen.append((contention.minislot[0, 5], again.minislot[0, 5]))
+            return contention
 
     seen = []
     policy = Doubted(mission)
@@ -249,3 +324,17 @@ def test_robots_that_let_news_go_first_are_younger_than_those_that_draw(task):
         for swarm, policy in [(Swarm(mission, range(3)), make_policy(name, mission))]
     }
     assert ages["age-gain-csma"] < 0.8 * ages["csma"]
+
+
+@pytest.mark.parametrize(
+    ("name", "robots"), [("csma", 3), ("age-gain-csma", 3), ("csma", 8), ("age-gain-csma", 20)]
+)
+def test_teams_among_blocks_come_to_know_everyone(name, robots):
+    """Robots that no wall lets sense each other must not transmit in every slot."""
+    mission = paper("stationary", num_robots=robots, arena="blocks")
+    swarm = Swarm(mission, range(930_000, 930_006))
+    policy = make_policy(name, mission)
+    for _ in range(150):
+        swarm.step(policy)
+    knows = swarm.buffers.is_known | np.eye(robots, dtype=bool)
+    assert np.all(knows)

@@ -14,8 +14,8 @@ from walls import walls
 
 from swarm_mj.mission import Mission, paper
 from swarm_mj.mission.surroundings import FadingLaw, PathLossLaw
-from swarm_mj.policies.carrier_sense import sensed_dbm
 from swarm_mj.protocol.packets import slot_bytes
+from swarm_mj.radio.carrier_sensing import CarrierSensing, usual_busy_dbm
 from swarm_mj.radio.effects import (
     EFFECTS,
     Effect,
@@ -69,13 +69,21 @@ def read_by(function):
 
 RADIO = {effect.__name__: read_by(effect.of) for effect in EFFECTS}
 RADIO["the plain radio"] = read_by(radio_of)
+BELIEF = read_by(lambda mission: mission_radio(mission, WALL))
 NOISE = read_by(lambda mission: Localisation(mission, [np.random.default_rng(0)]))
+
+
+def sensing_of(mission):
+    """All that carrier sensing takes of a mission."""
+    truth = mission_radio(mission).truth
+    sensing = Mission.contention_s.fget  # of which packets have the rest
+    return CarrierSensing(mission, truth), usual_busy_dbm(mission), sensing(mission)
+
+
 READERS = RADIO | {
-    "what robots know": read_by(lambda mission: mission_radio(mission, WALL)).difference(
-        *RADIO.values(), NOISE
-    ),
+    "what robots know": BELIEF.difference(*RADIO.values(), NOISE),
     "packets": read_by(slot_bytes),
-    "carrier sensing": read_by(sensed_dbm) - RADIO["the plain radio"],
+    "carrier sensing": read_by(sensing_of).difference(*RADIO.values(), BELIEF, NOISE),
 }
 
 

@@ -21,7 +21,7 @@ MISSION = paper("random-walk", num_robots=10, num_windows=16)
     ("policy", "own_pair"),
     [
         ("tdma", 0.0),
-        ("age-gain-csma", 25.0),
+        ("age-gain-csma", 8.0),
         ("sotdma", 230.0),
         ("planner", 250.0 + 4.0 * 10),
         ("greedy-oracle", 60.0),
