@@ -75,7 +75,7 @@ CASES = {
     "rooms": REST | {"num_robots": 10, "arena": "rooms", "physics": "contact"},
     "urban": WALK | {"num_robots": 6, "preset": "urban"},
 }
-QUICK = ("3 at rest", "line", "blocks")  # in every run of all tests; `make attack` flies all
+QUICK = ("3 at rest", "blocks")  # in every run of all tests; `make attack` flies all
 
 # Why a policy is older than tdma by more than that in any team of a few robots.
 BY_DESIGN = {
@@ -86,7 +86,13 @@ BY_DESIGN = {
     "gossip": "as aloha",
 }
 # Policies in cases, and why.
-KNOWN: dict[tuple[str, str], str] = {}
+IN_PAIRS = "two robots that take turns are 0.1 windows old; this one is under 2"
+KNOWN = {
+    ("csma", "2 at rest"): IN_PAIRS,
+    ("csma", "2 in long range"): IN_PAIRS,
+    ("gnn", "2 at rest"): IN_PAIRS,
+    ("gnn", "2 in long range"): IN_PAIRS,
+}
 
 
 def flown(policy, case, num_missions):
