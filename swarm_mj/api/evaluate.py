@@ -12,14 +12,14 @@ from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.flying import fly_study
 from swarm_mj.evaluation.results import Evaluated, Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
+from swarm_mj.evaluation.study_needs import study_needs
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission, PresetAndFields
 from swarm_mj.policies.registry import listed
 from swarm_mj.simulation.components import Components
-from swarm_mj.simulation.memory import policy_memory
 from swarm_mj.system.fields import check_value
-from swarm_mj.system.needs import Needs, check_fits, memory_errors
+from swarm_mj.system.needs import check_fits, memory_errors
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import quiet_console
 from swarm_mj.system.writing import Output, check_outputs
@@ -31,11 +31,6 @@ if TYPE_CHECKING:  # each is slow to import
 # pandas prints only the ends of a wide table, so these columns stand there.
 FIRST = ("policy", "num_robots", "aoi_mean", "aoi_sem")
 LAST = ("aoi_ci_low", "aoi_ci_high", "packets_per_window")
-# Of each age that is counted and of each mission, in memory and in a file [bytes].
-AGE_COUNT = 50.0
-AGE_COUNT_IN_FILE = 5.0
-RESULT = 1000.0
-RESULT_IN_FILE = 300.0
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
@@ -235,18 +230,6 @@ def evaluate(
     with memory_errors():
         fly_study(study, costs, flies, None, quiet_console())
     return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
-
-
-def study_needs(study: Study, num_jobs: int) -> Needs:
-    """Return the memory and disk of a study: a batch in each process, and the results of all."""
-    batches = study.batches
-    largest = max(policy_memory(x.policy, x.mission, len(x.seeds)) for x in batches)
-    ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
-    under_way = min(num_jobs, len(batches)) * largest
-    return Needs(
-        memory=under_way + AGE_COUNT * ages + RESULT * study.num_missions,
-        file=AGE_COUNT_IN_FILE * ages + RESULT_IN_FILE * study.num_missions,
-    )
 
 
 def _check_named(kind: str, part: object) -> None:

@@ -11,7 +11,6 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.api.evaluate import study_needs
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.evaluation import flying
@@ -20,6 +19,7 @@ from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
+from swarm_mj.evaluation.study_needs import study_needs
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission

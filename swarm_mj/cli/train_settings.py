@@ -61,9 +61,8 @@ def given_settings(given: Given) -> Given:
             continue
         value = given[place]
         if isinstance(value, tuple):
-            value = tuple(
-                dict.fromkeys(value)
-            )  # in their order, which decides who is trained first
+            # In their order, which decides who is trained first.
+            value = tuple(dict.fromkeys(value))
         settings[place] = value
     return settings
 

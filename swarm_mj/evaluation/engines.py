@@ -174,7 +174,8 @@ class Slurm:
                 del left[index]
                 yield index, product
             if not left:
-                return shutil.rmtree(folder)
+                shutil.rmtree(folder)
+                return
         raise OSError(f"{len(left)} pieces failed {ATTEMPTS} times; the logs are in {folder}")
 
 

@@ -113,21 +113,8 @@ PAPER_TEAM_PPO = PpoSettings(
     entropy=1e-6,
     value=0.5,
 )
-REFERENCE_TEAM_PPO = PpoSettings(
-    learning_rate=1e-4,
-    decay=0.95,
-    decay_steps=5000,
-    least_share=0.0,
-    num_steps=4,
-    num_minibatches=4,
-    num_epochs=4,
-    discount=0.99,
-    gae_lambda=0.95,
-    clip=0.1,
-    clips_value=True,
-    entropy=1e-6,
-    value=0.25,  # the code's value loss has an extra 1/2
-)
+# The code's value loss has an extra 1/2.
+REFERENCE_TEAM_PPO = replace(PAPER_TEAM_PPO, num_minibatches=4, value=0.25)
 ROBOTS_NETWORK = GnnShape(
     num_features=num_features("extended"), latent=32, depth=2, receptive_field=1, edges="both"
 )
@@ -143,7 +130,7 @@ class Training:
         credit_assignment: "robot", each paid for what its own packets changed, or "team", one
             reward for all.
         mission: What is flown, except for the team's size.
-        robots: Sizes of the team, from 2 to 200; several are trained on together.
+        robots: Sizes of the team, from 2 to `MAX_ROBOTS`; several are trained on together.
         features: What the network sees of each teammate: the name of a feature set, or
             `module:Name`.
         network: The layers of the network that acts.

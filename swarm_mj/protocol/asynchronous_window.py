@@ -12,7 +12,7 @@ from jaxtyping import Float, Int
 
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
-from swarm_mj.protocol.packets import entries_sent
+from swarm_mj.protocol.partial_buffers import entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import Decide, Move, Phase, respondents, transmit
 from swarm_mj.radio.asynchronous import AsynchronousChannel

@@ -9,20 +9,15 @@ and checksums, is not counted.
 import math
 from dataclasses import dataclass, replace
 
-import numpy as np
-from jaxtyping import Float, Int
-
 from swarm_mj.mission import Mission
-from swarm_mj.protocol.buffers import ABSENT, NEVER, NO_PARENT, Buffers
+from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.words import bits_per_second
-from swarm_mj.system.compiled import compiled
 
 MAX_STDS = 10.0  # more than any error of a position
 BITS_PER_BYTE = 8
 POSITION_BITS = 16  # per axis
 VELOCITY_BITS = 8  # per axis
-TIE_BREAK = 1e-9  # rises are halves of a window, so this decides between equal ones only
 AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
 
 
@@ -176,56 +171,5 @@ def check_whole(what: str, mission: Mission) -> None:
     check_fits(needs, packet_of(mission), mission, otherwise=", or fewer robots")
 
 
-@dataclass(frozen=True, kw_only=True)
-class PartialBuffers(Buffers):
-    """Buffers of which only some entries fit into a packet."""
-
-    num_entries: int
-    last_sent: Float[np.ndarray, "B N N"]  # T^{i,j} as i last sent it [windows], or NEVER
-
-
-def with_room(buffers: Buffers, num_entries: int) -> Buffers:
-    """Return the same buffers with packets of at most this many entries."""
-    if isinstance(buffers, PartialBuffers):
-        return replace(buffers, num_entries=min(num_entries, buffers.shape[1]))
-    if num_entries >= buffers.shape[1]:
-        return buffers
-    last_sent = np.full(buffers.timestamp.shape, NEVER)
-    return PartialBuffers(**vars(buffers), num_entries=num_entries, last_sent=last_sent)
-
-
-def entries_sent(buffers: Buffers, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N N"]:
-    """Choose the entries that everyone sends in this slot (II-B), and note them; return their T.
-
-    A robot always sends its own entry, and then those whose T has risen most since it last sent
-    them; ties go to the freshest. So every entry gets its turn. `ABSENT` at `[b, i, k]` where i's
-    packet has no entry of k.
-    """
-    if not isinstance(buffers, PartialBuffers):
-        return buffers.timestamp
-    return _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent)
-
-
 def _num_bits(fields: tuple[PacketField, ...]) -> int:
     return sum(each.num_bits for each in fields)
-
-
-@compiled()
-def _choose(
-    timestamp: Float[np.ndarray, "B N N"],
-    recipient: Int[np.ndarray, "B N"],
-    num_entries: int,
-    last_sent: Float[np.ndarray, "B N N"],
-) -> Float[np.ndarray, "B N N"]:
-    num_missions, num_robots = recipient.shape
-    sent = np.full_like(timestamp, ABSENT)
-    for b in range(num_missions):
-        for i in range(num_robots):
-            if recipient[b, i] == i:
-                continue
-            urgency = timestamp[b, i] - last_sent[b, i] + TIE_BREAK * timestamp[b, i]
-            urgency[i] = np.inf
-            for k in np.argsort(-urgency)[:num_entries]:
-                if timestamp[b, i, k] > NEVER:
-                    sent[b, i, k] = last_sent[b, i, k] = timestamp[b, i, k]
-    return sent

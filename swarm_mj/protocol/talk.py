@@ -4,7 +4,7 @@ from functools import partial
 
 from swarm_mj.protocol import asynchronous_window, compiled_window, window
 from swarm_mj.protocol.buffers import Buffers
-from swarm_mj.protocol.packets import PartialBuffers
+from swarm_mj.protocol.partial_buffers import PartialBuffers
 from swarm_mj.protocol.window_protocols import Talk
 from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel

@@ -21,7 +21,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
-from swarm_mj.protocol.packets import entries_sent
+from swarm_mj.protocol.partial_buffers import entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled

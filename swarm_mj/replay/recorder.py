@@ -202,9 +202,9 @@ class Recorder:
         is_cut_off = np.zeros_like(is_on)
         mismatch = links.NO_MISMATCH
         if snapshots:
-            for row, snapshot in enumerate(snapshots):
-                snapshot.links["row"] = row
             rows = np.concatenate([snapshot.links for snapshot in snapshots])
+            num_links = [len(snapshot.links) for snapshot in snapshots]
+            rows["row"] = np.repeat(np.arange(len(snapshots)), num_links)
             mismatch = links.LinkMismatch(window=window, links=rows)
             group = np.stack([snapshot.group for snapshot in snapshots])
             # Each snapshot stands until the next.

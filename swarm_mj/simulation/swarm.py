@@ -20,7 +20,8 @@ from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Pol
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
 from swarm_mj.protocol.checks import checked_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
-from swarm_mj.protocol.packets import fitting, packet_of, with_room
+from swarm_mj.protocol.packets import fitting, packet_of
+from swarm_mj.protocol.partial_buffers import with_room
 from swarm_mj.protocol.talk import talk_over
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews, Phase
@@ -184,13 +185,14 @@ class Swarm:
     @property
     def policy(self) -> CentralisedPolicy | DecentralisedPolicy:
         """The policy that flies; raises ValueError before one was started."""
-        if self._policy is None:
-            raise ValueError("no policy flies yet; start one: swarm.start(policy)")
+        self._check_started()
+        assert self._policy is not None
         return self._policy
 
     def _check_started(self) -> None:
         """Raise ValueError before a policy was started."""
-        _ = self.policy
+        if self._policy is None:
+            raise ValueError("no policy flies yet; start one: swarm.start(policy)")
 
     def start(self, policy: Policy) -> None:
         """Fly a policy from now on, with new random streams and all else forgotten.

@@ -12,9 +12,6 @@ import swarm_mj
 from swarm_mj.api import evaluate as module
 from swarm_mj.cli import main
 from swarm_mj.evaluation.results import COLUMNS
-from swarm_mj.evaluation.study import Study
-from swarm_mj.mission import paper
-from swarm_mj.simulation.memory import LIBRARIES
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
@@ -119,23 +116,6 @@ def test_a_table_begins_with_what_one_looks_for(found):
     assert columns[:4] == ["policy", "num_robots", "aoi_mean", "aoi_sem"]
     assert columns[-3:] == ["aoi_ci_low", "aoi_ci_high", "packets_per_window"]
     assert sorted(columns) == sorted(COLUMNS)
-
-
-def test_a_study_has_a_batch_in_each_process_while_batches_last():
-    regimes = (paper("stationary", num_robots=100), paper("stationary", num_robots=10))
-    study = Study(policies=("tdma", "gossip"), regimes=regimes, episodes=50)
-    one, two, many = (module.study_needs(study, jobs).memory for jobs in (1, 2, 256))
-    each = two - one
-    assert each == pytest.approx(LIBRARIES + 8500 * 100 + 57 * 25 * 100**2)
-    assert many == pytest.approx(one + 7 * each)  # 2 regimes, 2 policies, 2 batches of 25
-
-
-def test_a_studys_files_grow_with_its_missions():
-    regimes = (paper("stationary", num_windows=100_000),)
-    studies = (Study(policies=("tdma",), regimes=regimes, episodes=n) for n in (25, 25_000))
-    few, many = (module.study_needs(study, 1).file for study in studies)
-    assert many == pytest.approx(1000 * few)
-    assert many > 5e8
 
 
 @pytest.mark.parametrize("documented", [swarm_mj.fly, swarm_mj.evaluate, swarm_mj.Evaluation])

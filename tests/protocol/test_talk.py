@@ -11,7 +11,8 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.protocol import asynchronous_window, compiled_window, window
 from swarm_mj.protocol.buffers import empty_buffers
-from swarm_mj.protocol.packets import PacketField, packet_of, with_room
+from swarm_mj.protocol.packets import PacketField, packet_of
+from swarm_mj.protocol.partial_buffers import with_room
 from swarm_mj.protocol.talk import talk_over
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
