@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -72,10 +72,10 @@ Add = Callable[[np.ndarray, np.ndarray], np.ndarray]  # the next term to the sum
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class Column(Generic[Value]):
     """How one cost of missions is made of their windows."""
 
-    term: Callable[[Moment], Any]  # of a window: an array of a number a mission
+    term: Callable[[Moment], Value]  # of a window
     start: float = 0.0  # before the first window
     add: Add = np.add
     divisor: Callable[[int], int] = lambda _num_windows: 1  # of the sum, by the mission's length
@@ -161,7 +161,7 @@ class BatchCosts:
         raise ValueError(f"missions have no cost {cost.column}")
 
 
-COLUMNS: dict[str, Column] = {
+COLUMNS: dict[str, Column[np.ndarray]] = {
     spec.name: spec.metadata["column"] for spec in fields(BatchCosts) if "column" in spec.metadata
 }
 """The costs of each mission by their names: all but `ages`, which counts over all missions."""
