@@ -5,7 +5,8 @@ import re
 from pathlib import Path
 
 from swarm_mj.cli.mission_options import FLAGS
-from swarm_mj.radio.effects import EFFECTS, MissionEffect
+from swarm_mj.radio.effect import MissionEffect
+from swarm_mj.radio.effects import EFFECTS
 
 HEADS = ("effect", "options", "model")
 

@@ -1,47 +1,25 @@
-"""The summary of one flight: each number declared once, with its unit."""
+"""The summary of one flight, whose numbers are attributes and keys."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from typing import TYPE_CHECKING, Any
 
+from swarm_mj.simulation.rollout import FlownCosts
 from swarm_mj.system.arguments import did_you_mean
 
 
 @dataclass(frozen=True, kw_only=True, eq=False, repr=False)
-class FlightSummary(dict[str, Any]):
+class FlightSummary(dict[str, Any], FlownCosts[float, int, float | None, int | None]):
     """The costs of one flight, by the names and in the order of `swarm-mj fly --json`.
 
     Each number is an attribute. It is a key as well, so `summary["aoi_mean"]`, `dict(summary)` and
-    `json.dumps(summary)` do what they do with a dictionary. Counts of packets are totals, and None
-    where the policy sends no such packets: addressed ones are delivered or lost, broadcasts heard
-    or not.
+    `json.dumps(summary)` do what they do with a dictionary. None is what is not defined.
 
     Example:
         >>> run.summary.aoi_mean == run.summary["aoi_mean"]
         True
     """
 
-    num_windows: int  # that were flown
-    aoi_mean: float  # age of information, mean over windows [windows]
-    velocity_variance_mean: float  # mean over windows [m²/s²]
-    velocity_variance_first: float  # after the first window [m²/s²]
-    velocity_variance_last: float  # after the last window [m²/s²]
-    task_cost_name: str | None  # as the controller calls it; None if it has none
-    task_cost_unit: str | None  # of the next three
-    task_cost_mean: float | None  # mean over windows
-    task_cost_first: float | None  # after the first window
-    task_cost_last: float | None  # after the last window
-    hops_mean: float  # depth of the parent trees, mean over windows [hops]
-    complete_window: int | None  # after which everyone had heard of everyone; None: never
-    packets_sent: int  # requests or broadcasts
-    packets_transmitted: int  # all that were on the air, responses too
-    packets_attempted: int | None  # requests
-    packets_delivered: int | None  # of these, decoded by the recipient
-    packets_lost: int | None  # and of these, not
-    packets_overheard: int | None  # receptions of what was meant for another
-    packets_answered: int | None  # responses that the first sender decoded
-    packets_heard: int | None  # broadcasts that at least one robot decoded
-    hearers_per_packet: float | None  # robots that decoded a broadcast, mean [robots]
     packet_bytes: int  # of one packet [bytes]
     bytes_per_second: float  # that the team transmitted [bytes/s]
     velocity_variance_left: float | None  # last over first [1]; None if the first is 0

@@ -1,12 +1,12 @@
 """The numbers of one flight: for the terminal and for `--json`."""
 
 import math
-from collections.abc import Mapping
 from dataclasses import asdict
 from typing import Any
 
 import numpy as np
 
+from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
@@ -64,37 +64,38 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
     return ", ".join([mission.task, policy, team, f"seed {seed}", *where_flown(mission)])
 
 
-def flight_rows(mission: Mission, numbers: Mapping[str, Any], wall_s: float) -> dict[str, str]:
+def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     """Return the rows of a flight's table, at most 16.
 
     Args:
         mission: What was flown.
-        numbers: Of the flight, as `flight_numbers` returns them.
-        wall_s: How long it took to compute [s].
+        summary: What it cost.
     """
-    num_windows = numbers["num_windows"]
-    rows = {f"windows of {mission.window_s:g} s flown": f"{num_windows} in {wall_s:.2f} s"}
-    rows[f"{AOI.title}, mean"] = _windows(numbers["aoi_mean"], mission, AOI.digits)
+    num_windows = summary.num_windows
+    rows = {
+        f"windows of {mission.window_s:g} s flown": f"{num_windows} in {summary.wall_seconds:.2f} s"
+    }
+    rows[f"{AOI.title}, mean"] = _windows(summary.aoi_mean, mission, AOI.digits)
 
-    complete = numbers["complete_window"]
+    complete = summary.complete_window
     if complete is None:
-        shown_how = f"never; {numbers['heard_share']:.0%} of pairs at the end"
+        shown_how = f"never; {summary.heard_share:.0%} of pairs at the end"
     else:
         shown_how = f"after {_windows(complete, mission, 0)}"
     rows["everyone had heard of everyone"] = shown_how
 
-    hops = numbers["hops_mean"]
+    hops = summary.hops_mean
     rows["radio hops that news travelled, mean"] = f"{hops:.2f}" if hops else "-"
-    rows |= _packets(numbers)
+    rows |= _packets(summary)
 
     carried = "the sender's buffer"
-    if numbers["payload"] != "none":
-        carried += f" and {numbers['payload']}"
+    if summary.payload != "none":
+        carried += f" and {summary.payload}"
     rows["packets carry"] = carried
-    rate = bits_per_second(BITS_PER_BYTE * numbers["bytes_per_second"])
-    rows["  bytes each; sent by the team"] = f"{numbers['packet_bytes']:,}; {rate}"
-    rows["who decides"] = CENTRE if numbers["is_centralised"] else "each robot by itself"
-    rows |= _task_costs(mission, numbers)
+    rate = bits_per_second(BITS_PER_BYTE * summary.bytes_per_second)
+    rows["  bytes each; sent by the team"] = f"{summary.packet_bytes:,}; {rate}"
+    rows["who decides"] = CENTRE if summary.is_centralised else "each robot by itself"
+    rows |= _task_costs(mission, summary)
     if mission.num_failures:
         rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"
     return rows
@@ -117,35 +118,35 @@ def _windows(value: float | int, mission: Mission, digits: int) -> str:
     return f"{windows} ({value * mission.window_s:.2g} s)"
 
 
-def _packets(numbers: Mapping[str, Any]) -> dict[str, str]:
+def _packets(summary: FlightSummary) -> dict[str, str]:
     """Return the packets' fates: broadcasts are heard or not, addressed ones delivered or lost."""
-    sent = numbers["packets_sent"]
-    is_broadcast = numbers["packets_attempted"] is None
+    sent = summary.packets_sent
+    is_broadcast = summary.packets_attempted is None
     title = "packets broadcast" if is_broadcast else "packets sent, each to one robot"
-    rows = {title: f"{sent} ({sent / numbers['num_windows']:.1f} a window)"}
+    rows = {title: f"{sent} ({sent / summary.num_windows:.1f} a window)"}
     for label, name in FATES.items():
-        count = numbers[name]
+        count = summary[name]
         if count is None:  # of packets of the other kind
             continue
         rows[label] = f"{count} ({count / sent:.0%})" if sent else f"{count}"
     if is_broadcast:
-        hearers = numbers["hearers_per_packet"]
+        hearers = summary.hearers_per_packet
         rows["  robots that heard a packet, mean"] = "-" if hearers is None else f"{hearers:.2f}"
     else:
-        rows["  overheard by other robots"] = f"{numbers['packets_overheard']} times"
+        rows["  overheard by other robots"] = f"{summary.packets_overheard} times"
     return rows
 
 
-def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
+def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     """Return the task's cost; of the paper's moving teams, the velocity variance."""
-    name = numbers["task_cost_name"]
+    name = summary.task_cost_name
     if name not in (None, Flocking.cost_name):
-        return _cost_rows(numbers, TASK_COST, name=name, unit=numbers["task_cost_unit"])
+        return _cost_rows(summary, TASK_COST, name=name, unit=summary.task_cost_unit or "")
     if not mission.moves:
         return {}
     cost = VELOCITY_VARIANCE
-    rows = _cost_rows(numbers, cost, name=cost.title, unit=cost.unit)
-    left = numbers["velocity_variance_left"]
+    rows = _cost_rows(summary, cost, name=cost.title, unit=cost.unit)
+    left = summary.velocity_variance_left
     if mission.flocks and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
         verdict = "yes" if left < AGREED else "no"
@@ -154,12 +155,12 @@ def _task_costs(mission: Mission, numbers: Mapping[str, Any]) -> dict[str, str]:
 
 
 def _cost_rows(
-    numbers: Mapping[str, Any], cost: MissionCost, *, name: str, unit: str
+    summary: FlightSummary, cost: MissionCost, *, name: str, unit: str
 ) -> dict[str, str]:
     """Return a cost's mean over windows, and what it was at the start and the end."""
-    mean = numbers[f"{cost.column}_mean"]
-    first = numbers[f"{cost.column}_first"]
-    last = numbers[f"{cost.column}_last"]
+    mean = summary[f"{cost.column}_mean"]
+    first = summary[f"{cost.column}_first"]
+    last = summary[f"{cost.column}_last"]
     digits = cost.digits
     return {
         f"{name}, mean": f"{mean:.{digits}f} {unit}",

@@ -190,20 +190,18 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
     shown = []
     for fate, packets in footage.packets_at(row).items():
         way_m = palette.PACKETS[fate].share * (packets.end_m - packets.start_m)
-        span_m = np.linalg.norm(way_m, axis=1, keepdims=True)
-        far = span_m[:, 0] > 2.0 * radius_m
+        span_m = np.linalg.norm(way_m, axis=1)
+        far = span_m > 2.0 * radius_m
         if not np.any(far):
             continue
         # From rim to rim, so that no robot hides an arrow's head.
-        rim_m = radius_m * way_m[far] / span_m[far]
+        rim_m = radius_m * way_m[far] / span_m[far, None]
         start_m = packets.start_m[far] + rim_m
         along_m = way_m[far] - 2.0 * rim_m
         colour = rgb(palette.PACKETS[fate].colour)
         axes.quiver(
-            start_m[:, 0],
-            start_m[:, 1],
-            along_m[:, 0],
-            along_m[:, 1],
+            *start_m.T,
+            *along_m.T,
             angles="xy",
             scale_units="xy",
             scale=1.0,

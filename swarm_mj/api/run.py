@@ -92,7 +92,7 @@ class Run:
 
     @property
     def _rows(self) -> dict[str, str]:
-        return flight_rows(self.mission, self.summary, self.summary.wall_seconds)
+        return flight_rows(self.mission, self.summary)
 
     @property
     def title(self) -> str:

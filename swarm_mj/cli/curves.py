@@ -9,8 +9,14 @@ import numpy as np
 
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.evaluation.figures import quiet_matplotlib
-from swarm_mj.learning.run_folder import CURVE, SETTINGS, TrainingRun, read_curve, read_run
-from swarm_mj.learning.selection import REFERENCES, Row, column
+from swarm_mj.learning.run_folder import (
+    CURVE,
+    SETTINGS,
+    CurvePoint,
+    TrainingRun,
+    read_curve,
+    read_run,
+)
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
@@ -28,7 +34,7 @@ class Learned:
 
     folder: Path
     asked: TrainingRun  # what it was to do
-    rows: list[Row]  # its evaluations, at least one
+    rows: list[CurvePoint]  # its evaluations, at least one
 
 
 def _files_of_run(folder: Path) -> list[Path]:
@@ -63,7 +69,7 @@ def run(options: CurvesOptions) -> int:
         others = _missions(each.asked.training)
         if others != missions:
             raise ValueError(f"missions differ, {missions} and {others}; draw these runs apart")
-    levels = _reference_ages(runs[0].rows[0])
+    levels = runs[0].rows[0].references
     console = plain_console()
     for line in _table(runs, levels):
         console.print(line)
@@ -94,16 +100,6 @@ def _missions(training: Training) -> str:
     return f"{flags} --robots {sizes} --held-out {training.held_out}{own}"
 
 
-def _reference_ages(row: Row) -> dict[str, float]:
-    """Return the ages of the reference policies that a run has flown, by their names [windows]."""
-    ages: dict[str, float] = {}
-    for name in REFERENCES:
-        age = row.get(column(AOI, name))
-        if age is not None:
-            ages[name] = age
-    return ages
-
-
 def _table(runs: Sequence[Learned], levels: Mapping[str, float]) -> Iterator[str]:
     """Yield a heading, a line for each run, and one for each reference policy."""
     names = [str(each.folder) for each in runs]
@@ -111,8 +107,8 @@ def _table(runs: Sequence[Learned], levels: Mapping[str, float]) -> Iterator[str
     yield f"{'run':{width}}   seed   decisions  best age  last age [{AOI.unit}]"
     for name, each in zip(names, runs, strict=True):
         last = each.rows[-1]
-        best_age = min(row["aoi"] for row in each.rows)
-        numbers = f"{last['decisions']:11,.0f} {best_age:9.2f} {last['aoi']:9.2f}"
+        best_age = min(row.aoi for row in each.rows)
+        numbers = f"{last.decisions:11,.0f} {best_age:9.2f} {last.aoi:9.2f}"
         yield f"{name:{width}} {each.asked.training.seed:6} {numbers}"
     for policy, age in levels.items():
         yield f"{policy:{width}} {age:38.2f}"
@@ -141,7 +137,7 @@ def _line(group: Sequence[Learned]) -> "LearningCurve":
 
     ages_at: list[dict[float, float]] = []  # of each run, by the decisions behind them
     for each in group:
-        own = {row["decisions"]: row["aoi"] for row in each.rows}
+        own = {row.decisions: row.aoi for row in each.rows}
         ages_at.append(own)
     shared = set(ages_at[0])
     for own in ages_at:

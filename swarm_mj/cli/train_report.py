@@ -7,7 +7,15 @@ from rich.console import Console
 
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
-from swarm_mj.learning.selection import ORACLE, REFERENCES, Choice, Cost, Progress, Row, Status
+from swarm_mj.learning.selection import (
+    ORACLE,
+    REFERENCES,
+    Choice,
+    Cost,
+    CurveRow,
+    Progress,
+    Status,
+)
 from swarm_mj.protocol.mission_costs import AOI, MissionCost
 from swarm_mj.system.terminal import WorkBar
 
@@ -90,10 +98,10 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     return rows
 
 
-def _best_so_far(run: TrainingRun, progress: Progress, best: Row) -> Choice:
+def _best_so_far(run: TrainingRun, progress: Progress, best: CurveRow) -> Choice:
     """Return the choice that a run which has made none would make now: its best evaluation."""
     return Choice(
-        decisions=int(best["decisions"]),
+        decisions=best.decisions,
         run_decisions=progress.decisions,
         num_finalists=1,
         num_missions=run.training.held_out,
@@ -148,7 +156,7 @@ def _row(run: TrainingRun, progress: Progress) -> str:
     flown = {ORACLE: f" ({_oracle_missions(run)})"}
     ages = _reference_ages(row).items()
     others = "".join(f"  {name} {age.mean:.2f}{flown.get(name, '')}" for name, age in ages)
-    when = f"{row['decisions']:>11,.0f} decisions {row['minutes']:7.1f} min"
+    when = f"{row.decisions:>11,} decisions {row.minutes:7.1f} min"
     age = _amount(_age(row), AOI).removesuffix(f" {AOI.unit}")
     return f"{when}   held-out age {age}{note:13}{others}"
 
@@ -161,22 +169,18 @@ def _text(status: Status) -> str:
     elif not math.isnan(status.aoi):
         parts.append(f"age {status.aoi:.1f}")
     if progress.curve:
-        parts.append(f"held out {progress.curve[-1]['aoi']:.1f}")
+        parts.append(f"held out {progress.curve[-1].costs.aoi:.1f}")
     return ", ".join(parts)
 
 
-def _age(row: Row) -> Cost:
-    return Cost(mean=row["aoi"], sem=row.get("aoi_sem"))
+def _age(row: CurveRow) -> Cost:
+    return Cost(mean=row.costs.aoi, sem=row.costs.aoi_sem)
 
 
-def _reference_ages(row: Row) -> dict[str, Cost]:
+def _reference_ages(row: CurveRow) -> dict[str, Cost]:
     """Return the ages of reference policies that were flown on the same missions [windows]."""
-    ages: dict[str, Cost] = {}
-    for name in REFERENCES:
-        age = row.get(selection.column(AOI, name))
-        if age is not None:
-            ages[name] = Cost(mean=age, sem=None)
-    return ages
+    ages = selection.reference_ages(row.references)
+    return {name: Cost(mean=age, sem=None) for name, age in ages.items()}
 
 
 def _oracle_missions(run: TrainingRun) -> str:

@@ -2,13 +2,13 @@
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, field, fields
-from typing import Any, TypeVar
+from typing import Generic, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.evaluation.ages import connectivity_floor, count_ages
 from swarm_mj.mission import Mission
-from swarm_mj.mission.geometry import gather_connected
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.policies.registry import make_policy_with
@@ -22,7 +22,6 @@ from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
-from swarm_mj.system.compiled import compiled
 from swarm_mj.system.user_code import one_line_each
 
 
@@ -72,10 +71,10 @@ Add = Callable[[np.ndarray, np.ndarray], np.ndarray]  # the next term to the sum
 
 
 @dataclass(frozen=True, kw_only=True)
-class Column:
+class Column(Generic[Value]):
     """How one cost of missions is made of their windows."""
 
-    term: Callable[[Moment], Any]  # of a window: an array of a number a mission
+    term: Callable[[Moment], Value]  # of a window
     start: float = 0.0  # before the first window
     add: Add = np.add
     divisor: Callable[[int], int] = lambda _num_windows: 1  # of the sum, by the mission's length
@@ -161,7 +160,7 @@ class BatchCosts:
         raise ValueError(f"missions have no cost {cost.column}")
 
 
-COLUMNS: dict[str, Column] = {
+COLUMNS: dict[str, Column[np.ndarray]] = {
     spec.name: spec.metadata["column"] for spec in fields(BatchCosts) if "column" in spec.metadata
 }
 """The costs of each mission by their names: all but `ages`, which counts over all missions."""
@@ -240,63 +239,3 @@ def merge(batches: Sequence[BatchCosts]) -> BatchCosts:
 def _finite(values: Float[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
     """Return nan in place of infinity: a controller's cost may be, which has no mean."""
     return np.where(np.isfinite(values), values, np.nan)
-
-
-@compiled()
-def count_ages(
-    timestamp: Float[np.ndarray, "B N N"],
-    now: Float[np.ndarray, "B"],
-    counts: Int[np.ndarray, "bins"],
-    is_active: Bool[np.ndarray, "B N"],
-) -> None:
-    """Add to `counts`, by age in slots, how old what active robots know of each other is."""
-    num_missions, num_robots = timestamp.shape[:2]
-    for b in range(num_missions):
-        for i in range(num_robots):
-            if not is_active[b, i]:
-                continue
-            for j in range(num_robots):
-                if is_active[b, j]:
-                    counts[int((now[b] - timestamp[b, i, j]) / SLOT_WINDOWS)] += 1
-            counts[int((now[b] - timestamp[b, i, i]) / SLOT_WINDOWS)] -= 1
-
-
-@compiled()
-def connectivity_floor(
-    timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N 2"],
-    range_m: float,
-    now: Float[np.ndarray, "B"],
-    is_on: Bool[np.ndarray, "B N"],
-) -> Float[np.ndarray, "B"]:
-    """Let connected robots share everything at once; return the mean age of all pairs as in II-C.
-
-    Two robots are neighbours while a lone packet decodes between them, within `range_m`. At the end
-    of a window, `now`, every robot receives the newest entries of its connected part of the disk
-    graph, in T [windows] in place. The age that is left is due to teams that fall apart: the
-    floor that no radio goes below, if robots rest while they talk. Only robots that are on share
-    and count.
-    """
-    num_missions, num_robots = position_m.shape[:2]
-    age = np.empty(num_missions)
-    newest = np.empty(num_robots)
-    is_met = np.empty(num_robots, dtype=np.bool_)
-    part = np.empty(num_robots, dtype=np.int64)
-    for b in range(num_missions):
-        is_met[:] = ~is_on[b]  # robots that are off share nothing, so no part begins at them
-        total = 0.0
-        for first in range(num_robots):
-            if is_met[first]:
-                continue
-            members = part[: gather_connected(position_m[b], range_m, first, is_met, part)]
-            newest[:] = timestamp[b, first]
-            for i in members:
-                np.maximum(newest, timestamp[b, i], newest)  # in place: nothing is allocated
-            for i in members:
-                newest[i] = now[b]
-            for i in members:
-                timestamp[b, i] = newest
-            total += members.size * newest[is_on[b]].sum()
-        num_on = is_on[b].sum()
-        age[b] = now[b] - total / (num_on * num_on)
-    return age

@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import policy_of
-from swarm_mj.learning.selection import Progress, candidates
+from swarm_mj.learning.selection import Progress, candidates, curve_row_of
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.feature_sets import check_unchanged, known_names
 from swarm_mj.policies.gnn.network import AggregationGnn
@@ -56,7 +56,7 @@ def save(
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
         "feature_names": list(known_names(training.features)),
-        "progress": asdict(progress),
+        "progress": asdict(progress) | {"curve": [row.columns() for row in progress.curve]},
         "weights": model.policy.state_dict(),
         "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
         "normaliser": normaliser,
@@ -110,15 +110,16 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
 
     Raises any Exception if a part is missing, or does not fit the model.
     """
-    progress = read_plain(state["progress"], Progress)
+    stored = state["progress"]
+    progress = read_plain(stored | {"curve": []}, Progress)
+    progress.curve = [curve_row_of(row) for row in stored["curve"]]
     env = env_of(model)
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
     networks = Networks()
     for row in candidates(progress.curve):
-        decisions = int(row["decisions"])
         network = policy_of(model).acting_network()
-        network.load_state_dict(state["candidates"][decisions])
-        networks[decisions] = network
+        network.load_state_dict(state["candidates"][row.decisions])
+        networks[row.decisions] = network
     model.policy.load_state_dict(state["weights"])
     optimizer = model.policy.optimizer
     # Only Adam's moments are the file's; its rate and epsilon are of the settings.

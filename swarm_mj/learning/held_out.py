@@ -18,7 +18,16 @@ from jaxtyping import Float
 from swarm_mj.evaluation.batch import BatchCosts, costs_of
 from swarm_mj.evaluation.samples import standard_error
 from swarm_mj.learning import selection
-from swarm_mj.learning.selection import COMPARED, NEAR, OTHER_FLIGHTS, Choice, Cost, Row
+from swarm_mj.learning.selection import (
+    COMPARED,
+    NEAR,
+    OTHER_FLIGHTS,
+    Choice,
+    Columns,
+    Cost,
+    CurveRow,
+    HeldOutCosts,
+)
 from swarm_mj.learning.settings import (
     CHOICE_SEED,
     HELD_OUT_SEED,
@@ -78,31 +87,20 @@ def held_out_policy(training: Training, network: AggregationGnn, mission: Missio
 
 def evaluate(
     training: Training, network: AggregationGnn, on_window: OnWindow = lambda _share: None
-) -> Row:
-    """Fly the held-out missions; return their mean costs, by the learning curve's columns.
-
-    Team sizes count alike. `aoi` is the age of information [windows], with its standard error over
-    the missions unless there is one only, `aoi_steady` that of the missions' second half.
-    `velocity_variance` is in m²/s². The best policy has the least `objective`, by the reward's
-    cost.
-    """
+) -> HeldOutCosts:
+    """Fly the held-out missions; return their mean costs."""
     flights = Flights(training=training, on_window=on_window)
     flies = partial(held_out_policy, training, network)
     return _means(training, flights.fly(flies, HELD_OUT_SEED, training.held_out))
 
 
-def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWindow) -> Row:
+def reference_columns(
+    training: Training, curve: Sequence[CurveRow], on_window: OnWindow
+) -> Columns:
     """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
     if curve:
-        names: set[str] = set()
-        for cost in LEARNED_COSTS:
-            names |= {selection.column(cost, name) for name in selection.REFERENCES}
-        flown_before: Row = {}
-        for name, value in curve[0].items():
-            if name in names:
-                flown_before[name] = value
-        return flown_before
-    columns: Row = {}
+        return curve[0].references
+    columns: Columns = {}
     flown_by = selection.reference_missions(training)
     flights = Flights(training=training, on_window=on_window, total=len(flown_by))
     for name, num_missions in flown_by.items():
@@ -114,21 +112,21 @@ def reference_columns(training: Training, curve: Sequence[Row], on_window: OnWin
 
 def choose(
     training: Training,
-    curve: Sequence[Row],
+    curve: Sequence[CurveRow],
     networks: Mapping[int, AggregationGnn],  # the candidates', by the decisions behind them
     on_window: OnWindow,
-) -> tuple[Choice, Row]:
+) -> tuple[Choice, HeldOutCosts]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
     rows = selection.finalists(curve)
-    run_decisions = int(curve[-1]["decisions"])
+    run_decisions = curve[-1].decisions
     flights = Flights(training=training, on_window=on_window, total=len(rows) + OTHER_FLIGHTS)
     size = selection.num_missions(training, run_decisions, flights.total)
 
-    def flies(row: Row) -> MakePolicy:
-        return partial(held_out_policy, training, networks[int(row["decisions"])])
+    def flies(row: CurveRow) -> MakePolicy:
+        return partial(held_out_policy, training, networks[row.decisions])
 
-    def objective(row: Row) -> float:
-        return _means(training, flights.fly(flies(row), CHOICE_SEED, size))["objective"]
+    def objective(row: CurveRow) -> float:
+        return _means(training, flights.fly(flies(row), CHOICE_SEED, size)).objective
 
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
     costs = flights.fly(flies(kept), TEST_SEED, size)
@@ -141,7 +139,7 @@ def choose(
         samples = _samples(flights.fly(policy_of, TEST_SEED, size), training.cost)
         others[name] = _compared(samples, own)
     choice = Choice(
-        decisions=int(kept["decisions"]),
+        decisions=kept.decisions,
         run_decisions=run_decisions,
         num_finalists=len(rows),
         num_missions=size,
@@ -188,7 +186,7 @@ def record_replay(
     write_replay(recorder.log(about), about, folder / f"decisions-{decisions:09d}.rrd")
 
 
-def _means(training: Training, costs: Flown) -> Row:
+def _means(training: Training, costs: Flown) -> HeldOutCosts:
     age = _samples(costs, AOI)
     variance = _samples(costs, VELOCITY_VARIANCE)
     if training.cost is AOI:
@@ -199,16 +197,15 @@ def _means(training: Training, costs: Flown) -> Row:
     sent = sum(float(each.packets_sent.sum()) for each in costs)
     delivered = sum(float(each.packets_delivered.sum()) for each in costs)
     num_windows = training.mission.num_windows * sum(each.aoi.size for each in costs)
-    means = {"aoi": _mean(age)}
-    error = _standard_error(age)
-    if error is not None:
-        means["aoi_sem"] = error
-    means["aoi_steady"] = _mean([each.aoi_steady for each in costs])
-    means["velocity_variance"] = _mean(variance)
-    means["packets_per_window"] = sent / num_windows
-    means["delivery_ratio"] = delivered / max(1.0, sent)
-    means["objective"] = _mean(objective)
-    return means
+    return HeldOutCosts(
+        aoi=_mean(age),
+        aoi_sem=_standard_error(age),
+        aoi_steady=_mean([each.aoi_steady for each in costs]),
+        velocity_variance=_mean(variance),
+        packets_per_window=sent / num_windows,
+        delivery_ratio=delivered / max(1.0, sent),
+        objective=_mean(objective),
+    )
 
 
 def _samples(costs: Flown, cost: MissionCost) -> Samples:

@@ -20,6 +20,7 @@ from swarm_mj.learning.settings import Device, PpoSettings, Training
 from swarm_mj.policies.gnn.decisions import recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
 from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.learned import sample
 
 CPU = torch.device("cpu")
 
@@ -213,7 +214,7 @@ class GnnActorCritic(ActorCriticPolicy):
     ) -> tuple[Int[Tensor, "E *robots"], Float[Tensor, "E"], Float[Tensor, "E"]]:
         """Actions, values and the actions' log-probabilities."""
         logits, value = self.logits_and_value(obs)
-        actions = logits.argmax(-1) if deterministic else boltzmann_sample(logits)
+        actions = logits.argmax(-1) if deterministic else draw(logits)
         return actions, value, log_probability(logits, actions)
 
     def evaluate_actions(
@@ -233,13 +234,13 @@ class GnnActorCritic(ActorCriticPolicy):
         return self.logits_and_value(obs)[1]
 
 
-def boltzmann_sample(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
-    """Return a draw from each row's Boltzmann distribution, by its cumulated probabilities."""
-    # In doubles: a uniform single is below 1 by more than their rounding, so the last recipient
-    # that has no probability is never drawn.
-    cumulated = logits.double().softmax(-1).cumsum(-1)
-    uniform = torch.rand(*logits.shape[:-1], 1, device=logits.device)
-    return (cumulated <= uniform * cumulated[..., -1:]).sum(-1)
+def draw(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
+    """Return a draw from each row's Boltzmann distribution, as `LearnedPolicy` makes it."""
+    # In doubles, so that rounding of the weights does not move a draw from one row to the next
+    # recipient. Rollouts are on the CPU, so nothing is copied.
+    rows = logits.detach().double().flatten(0, -2).numpy()
+    uniform = torch.rand(len(rows)).double().numpy()
+    return torch.from_numpy(sample(rows, uniform)).view(logits.shape[:-1])
 
 
 def log_probability(

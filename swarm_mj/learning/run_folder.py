@@ -9,8 +9,9 @@ import os
 from collections.abc import Collection
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
+from typing import NamedTuple
 
-from swarm_mj.learning.selection import OTHER_FLIGHTS, Row, num_missions
+from swarm_mj.learning.selection import OTHER_FLIGHTS, Columns, num_missions, reference_ages
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.gnn.feature_sets import remembers_packets
 from swarm_mj.policies.stored import POLICY
@@ -120,19 +121,34 @@ def read_run(folder: Path, named: Collection[str] | None = ()) -> TrainingRun:
     return run
 
 
-def read_curve(path: Path) -> list[Row]:
-    """Return a learning curve, a row an evaluation; raise ValueError if the file holds none."""
+class CurvePoint(NamedTuple):
+    """What is drawn of an evaluation; a file need have no more than the first two columns."""
+
+    decisions: float
+    aoi: float  # [windows]
+    aoi_sem: float | None  # [windows]
+    references: dict[str, float]  # ages of reference policies, by their names [windows]
+
+
+def read_curve(path: Path) -> list[CurvePoint]:
+    """Return a learning curve, a point an evaluation; raise ValueError if the file holds none."""
     rows = read_rows(path, "learning curve", MAX_CURVE_BYTES)
     try:
-        curve: list[Row] = []
+        curve: list[CurvePoint] = []
         for _, cells in rows:
-            row: Row = {}
+            row: Columns = {}
             for name, cell in cells.items():
                 if cell:
                     row[name] = float(cell)
-            if not (row["decisions"] >= 0 and row["aoi"] >= 0):
+            point = CurvePoint(
+                decisions=row["decisions"],
+                aoi=row["aoi"],
+                aoi_sem=row.get("aoi_sem"),
+                references=reference_ages(row),
+            )
+            if not (point.decisions >= 0 and point.aoi >= 0):
                 raise ValueError("a cell is negative, or no number")
-            curve.append(row)
+            curve.append(point)
         return curve
     except (KeyError, ValueError) as error:
         raise ValueError(f"{path} is no learning curve, of decisions and aoi: {error}") from error

@@ -5,13 +5,13 @@ none of them was judged on, and the reported age is from a third set. `held_out`
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, fields
 from pathlib import Path
 
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
-from swarm_mj.protocol.mission_costs import MissionCost
+from swarm_mj.protocol.mission_costs import AOI, MissionCost
 from swarm_mj.system.writing import write_csv
 
 ORACLE = "greedy-oracle"
@@ -32,7 +32,62 @@ FLOWN_SHARE = 0.5  # of a run's decisions, for its choice; they cost less than l
 RESERVED_SHARE = 0.5  # of a run's minutes, at most, kept back for its choice
 MIN_GAIN = 0.005  # of the objective, that counts as learning
 
-Row = dict[str, float]
+Columns = dict[str, float]  # numbers by the names of the learning curve's columns
+
+
+@dataclass(frozen=True, kw_only=True)
+class HeldOutCosts:
+    """What the held-out missions cost a policy: means in which team sizes count alike."""
+
+    aoi: float  # age of information [windows]
+    aoi_sem: float | None = None  # its standard error over the missions; None of one mission
+    aoi_steady: float  # age in the missions' second half [windows]
+    velocity_variance: float  # [m²/s²]
+    packets_per_window: float  # sent
+    delivery_ratio: float  # of these
+    objective: float  # by the reward's cost; the best policy has the least
+
+
+@dataclass(frozen=True, kw_only=True)
+class CurveRow:
+    """A row of the learning curve: what one evaluation found."""
+
+    decisions: int  # of teams, before it
+    minutes: float  # before its end
+    costs: HeldOutCosts
+    references: Columns = field(default_factory=dict)  # costs of `REFERENCES`, such as `aoi_tdma`
+    training: Columns = field(default_factory=dict)  # since the last one: `rollout/aoi` and others
+
+    def columns(self) -> Columns:
+        """Return the row as it is written, in the order of the columns."""
+        row: Columns = {"decisions": float(self.decisions), "minutes": self.minutes}
+        for name, value in asdict(self.costs).items():
+            if value is not None:
+                row[name] = value
+        return row | self.references | self.training
+
+
+def curve_row_of(row: Mapping[str, float]) -> CurveRow:
+    """Return what `CurveRow.columns` was made of; raise KeyError if a column is missing."""
+    left = dict(row)
+    decisions = int(left.pop("decisions"))
+    minutes = left.pop("minutes")
+    costs: Columns = {}
+    for spec in fields(HeldOutCosts):
+        if spec.name in left or spec.name != "aoi_sem":
+            costs[spec.name] = left.pop(spec.name)
+    references: Columns = {}
+    training: Columns = {}
+    for name, value in left.items():
+        # A slash makes a group in TensorBoard, which is where these two kinds come from.
+        (training if "/" in name else references)[name] = value
+    return CurveRow(
+        decisions=decisions,
+        minutes=minutes,
+        costs=HeldOutCosts(**costs),
+        references=references,
+        training=training,
+    )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -78,7 +133,7 @@ class Accumulator:
             self.attempted += int(costs.packets.attempted.sum())
             self.delivered += int(costs.packets.delivered.sum())
 
-    def means(self) -> Row:
+    def means(self) -> Columns:
         """Return means per mission and window; none before the first."""
         if not self.decisions:
             return {}
@@ -97,9 +152,9 @@ class Progress:
     decisions: int = 0  # of teams, in all sessions
     minutes: float = 0.0  # in all sessions, evaluations included
     next_replay: int = 0  # team decisions
-    curve: list[Row] = field(default_factory=list)  # one row an evaluation
+    curve: list[CurveRow] = field(default_factory=list)
     since_evaluation: Accumulator = field(default_factory=Accumulator)
-    optimiser: Row = field(default_factory=dict)  # what PPO last logged of itself
+    optimiser: Columns = field(default_factory=dict)  # what PPO last logged of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
     evaluation_minutes: float = 0.0  # that the last one took
 
@@ -109,29 +164,30 @@ class Progress:
         return self.choice is not None and self.choice.run_decisions == self.decisions
 
     @property
-    def best(self) -> Row | None:
+    def best(self) -> CurveRow | None:
         """The best evaluation."""
-        return min(self.curve, key=lambda row: row["objective"], default=None)
+        return min(self.curve, key=objective_of, default=None)
 
     def is_due(self, every: int) -> bool:
         """Return whether another interval of as many decisions began since the last evaluation."""
-        last = self.curve[-1]["decisions"] if self.curve else -1
+        last = self.curve[-1].decisions if self.curve else -1
         return self.decisions // every > last // every
 
     def has_stalled(self, patience: int | None) -> bool:
         """Return whether the last `patience` evaluations brought no gain; never with None or 0."""
         if not patience or len(self.curve) <= patience:
             return False
-        least_before = min(row["objective"] for row in self.curve[:-patience])
-        least = min(row["objective"] for row in self.curve[-patience:])
+        least_before = min(map(objective_of, self.curve[:-patience]))
+        least = min(map(objective_of, self.curve[-patience:]))
         return least > (1.0 - MIN_GAIN) * least_before
 
     def write_curve(self, path: Path) -> None:
         """Write the learning curve; later rows may have more columns."""
         columns: dict[str, None] = {}  # in order, each once
-        for row in self.curve:
+        rows = [evaluation.columns() for evaluation in self.curve]
+        for row in rows:
             columns |= dict.fromkeys(row)
-        write_csv(path, list(columns), self.curve)
+        write_csv(path, list(columns), rows)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -148,9 +204,24 @@ class Status:
 Listener = Callable[[Status], bool]
 
 
+def objective_of(evaluation: CurveRow) -> float:
+    """Return what is minimised."""
+    return evaluation.costs.objective
+
+
 def column(cost: MissionCost, name: str) -> str:
     """Return the learning curve's column for a cost of a policy of `REFERENCES`."""
     return f"{cost.column}_{name}".replace("-", "_")
+
+
+def reference_ages(row: Mapping[str, float]) -> dict[str, float]:
+    """Return the ages of those of `REFERENCES` that a row has, by their names [windows]."""
+    ages: dict[str, float] = {}
+    for name in REFERENCES:
+        age = row.get(column(AOI, name))
+        if age is not None:
+            ages[name] = age
+    return ages
 
 
 def reference_missions(training: Training) -> dict[str, int]:
@@ -162,17 +233,17 @@ def reference_missions(training: Training) -> dict[str, int]:
     return flown
 
 
-def candidates(curve: Sequence[Row]) -> list[Row]:
+def candidates(curve: Sequence[CurveRow]) -> list[CurveRow]:
     """Return evaluations whose policies may be chosen: the best few, and the first, the start."""
-    best = sorted(curve, key=lambda row: row["objective"])[:NUM_BEST]
+    best = sorted(curve, key=objective_of)[:NUM_BEST]
     return [row for row in curve if row in best or row is curve[0]]
 
 
-def finalists(curve: Sequence[Row]) -> list[Row]:
+def finalists(curve: Sequence[CurveRow]) -> list[CurveRow]:
     """Return candidates that may be the best in truth, though not on the held-out missions."""
     rows = candidates(curve)
-    near = NEAR * min(row["objective"] for row in rows)
-    return [row for row in rows if row["objective"] <= near]
+    near = NEAR * min(map(objective_of, rows))
+    return [row for row in rows if objective_of(row) <= near]
 
 
 def num_missions(training: Training, decisions: int, num_flights: int) -> int:

@@ -16,7 +16,14 @@ from swarm_mj.learning import checkpoint, held_out, run_folder, selection
 from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
-from swarm_mj.learning.selection import Accumulator, Choice, Listener, Progress, Row
+from swarm_mj.learning.selection import (
+    Accumulator,
+    Choice,
+    CurveRow,
+    HeldOutCosts,
+    Listener,
+    Progress,
+)
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import POLICY, read_policy, save_gnn
 from swarm_mj.system.packages import commit, version
@@ -186,7 +193,7 @@ class TrainingSession(BaseCallback):
         logged = self.logger.name_to_value
         means = {name: float(logged[name]) for name in OPTIMISER if name in logged}
         progress.optimiser = means or progress.optimiser  # of PPO's last passes over a rollout
-        is_new = not progress.curve or progress.curve[-1]["decisions"] < decisions
+        is_new = not progress.curve or progress.curve[-1].decisions < decisions
         is_due = is_new and (is_last or progress.is_due(self._training.evaluate_every))
         if is_due:
             if not progress.curve:
@@ -227,17 +234,23 @@ class TrainingSession(BaseCallback):
         self._count_time()
         progress.evaluation_minutes = progress.minutes - begun
         progress.since_evaluation = Accumulator()
-        row = {"decisions": float(decisions), "minutes": progress.minutes, **costs, **others}
-        progress.curve.append(row | means | progress.optimiser)
-        for name, value in progress.curve[-1].items():
+        evaluation = CurveRow(
+            decisions=decisions,
+            minutes=progress.minutes,
+            costs=costs,
+            references=others,
+            training=means | progress.optimiser,
+        )
+        progress.curve.append(evaluation)
+        for name, value in evaluation.columns().items():
             self.logger.record(name if "/" in name else f"held_out/{name}", value)
         self.logger.dump(decisions)
         progress.write_curve(self._folder / CURVE)
         self._networks[decisions] = network
-        kept = {int(row["decisions"]) for row in selection.candidates(progress.curve)}
+        kept = {row.decisions for row in selection.candidates(progress.curve)}
         for dropped in self._networks.keys() - kept:
             del self._networks[dropped]
-        if progress.best is progress.curve[-1]:
+        if progress.best is evaluation:
             progress.choice = None
             self._keep(decisions, costs, None)
         self._report()
@@ -256,30 +269,32 @@ class TrainingSession(BaseCallback):
         progress.choice = choice
         self._save()
 
-    def _keep(self, decisions: int, costs: Row, choice: Choice | None) -> None:
+    def _keep(self, decisions: int, costs: HeldOutCosts, choice: Choice | None) -> None:
         """Store the policy of the evaluation after this many decisions, with its costs."""
         training = self._training
         row = _row_at(self.progress.curve, decisions)
         made = {
             "command": self._run.command,
             "decisions": decisions,
-            "minutes": row["minutes"],
+            "minutes": row.minutes,
         }
         config = GnnConfig(
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,
             training=asdict(training) | made,
-            evaluation={"aoi_sem": None, **costs} | held_out.notes_of(training, choice),
+            evaluation={"aoi_sem": costs.aoi_sem}
+            | asdict(costs)
+            | held_out.notes_of(training, choice),
             commit=commit(),
             version=version(),
         )
         save_gnn(self._folder / POLICY, self._networks[decisions], config)
 
 
-def _row_at(curve: Iterable[Row], decisions: int) -> Row:
+def _row_at(curve: Iterable[CurveRow], decisions: int) -> CurveRow:
     """Return the evaluation after this many decisions."""
     for row in curve:
-        if row["decisions"] == decisions:
+        if row.decisions == decisions:
             return row
     raise LookupError(f"the curve has no evaluation after {decisions} decisions")

@@ -1,50 +1,27 @@
 """A window in one compiled call, for the paper's radio and packets of whole buffers.
 
 `protocol.window` is the text to read. This does the same, function by function, and is made of the
-same loops; a test holds it equal to the readable one in every array. Three kinds of positions meet
-here: where a robot truly is, which the radio goes by; where it observes itself to be; and where
-others believe it to be.
+same loops, slot by slot (`compiled_slot`). A test holds it equal to the readable one in all arrays.
 """
-
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import Buffers, merge_newer, write_attempt, write_own
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS
-from swarm_mj.protocol.window import Decide, Move, Phase, answer, silence
-from swarm_mj.radio.free_space import FreeSpaceRadio, decode_strongest
+from swarm_mj.protocol.buffers import Buffers
+from swarm_mj.protocol.compiled_slot import (
+    KnownArrays,
+    RadioNumbers,
+    TrueArrays,
+    a_slot_after,
+    merge,
+    observe_self,
+    record_attempt,
+    transmit,
+)
+from swarm_mj.protocol.window import Decide, Move, Phase, answer
+from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.system.compiled import compiled
-
-
-class _Known(NamedTuple):
-    """The arrays of `Buffers` that a window writes: all that robots know of each other."""
-
-    timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
-    believed_m: Float[np.ndarray, "B N N 2"]  # of M^{i,j}: the buffers' `position_m`
-    believed_mps: Float[np.ndarray, "B N N 2"]  # of M^{i,j}: the buffers' `velocity_mps`
-    parent: Int[np.ndarray, "B N N"]  # P^{i,j}
-    last_attempt: Float[np.ndarray, "B N N"]  # L^{i,j} [windows]
-
-
-class _Truth(NamedTuple):
-    """The robots as they are: the arrays of `RobotStates`."""
-
-    true_m: Float[np.ndarray, "B N 2"]
-    observed_m: Float[np.ndarray, "B N 2"]  # its own place, as each robot observes it
-    observed_mps: Float[np.ndarray, "B N 2"]  # its own velocity, which it observes without error
-    is_active: Bool[np.ndarray, "B N"] | None  # None is compiled apart, as all of them
-
-
-class _Radio(NamedTuple):
-    """The numbers of `FreeSpaceRadio`."""
-
-    received_at_1_m_mw: float
-    noise_mw: float
-    threshold: float  # linear [1]
-    hears_while_sending: bool
 
 
 def window(
@@ -164,20 +141,20 @@ def _compiled_play(
     heard_answer: Int[np.ndarray, "B N"] | None,
 ) -> None:
     """Pack what came in flat, and play with it."""
-    known = _Known(
+    known = KnownArrays(
         timestamp=timestamp,
         believed_m=believed_m,
         believed_mps=believed_mps,
         parent=parent,
         last_attempt=last_attempt,
     )
-    truth = _Truth(
+    truth = TrueArrays(
         true_m=true_m,
         observed_m=observed_m,
         observed_mps=observed_mps,
         is_active=is_active,
     )
-    radio = _Radio(
+    radio = RadioNumbers(
         received_at_1_m_mw=received_at_1_m_mw,
         noise_mw=noise_mw,
         threshold=threshold,
@@ -201,9 +178,9 @@ def _compiled_play(
 
 @compiled()
 def _window(
-    known: _Known,
-    truth: _Truth,
-    radio: _Radio,
+    known: KnownArrays,
+    truth: TrueArrays,
+    radio: RadioNumbers,
     request: Phase,
     response: Phase,
     now: Float[np.ndarray, "B"],
@@ -211,104 +188,32 @@ def _window(
 ) -> None:
     """Play a transmission phase, then a response phase; both get what was heard."""
     # Transmission phase.
-    t = _a_slot_after(now)
-    _observe_self(known, truth, t)
-    _record_attempt(known, truth, request, t, silence_is_attempt)
-    _transmit(truth, radio, request)
-    _merge(known, request)
+    t = a_slot_after(now)
+    observe_self(known, truth, t)
+    record_attempt(known, truth, request, t, silence_is_attempt)
+    transmit(truth, radio, request)
+    merge(known, request)
 
     # Response phase.
-    t = _a_slot_after(t)
-    _observe_self(known, truth, t)
+    t = a_slot_after(t)
+    observe_self(known, truth, t)
     answer(request.recipient, request.heard, response.recipient)
-    _transmit(truth, radio, response)
-    _merge(known, response)
+    transmit(truth, radio, response)
+    merge(known, response)
 
 
 @compiled()
 def _broadcast(
-    known: _Known,
-    truth: _Truth,
-    radio: _Radio,
+    known: KnownArrays,
+    truth: TrueArrays,
+    radio: RadioNumbers,
     phase: Phase,
     now: Float[np.ndarray, "B"],
     silence_is_attempt: bool,
 ) -> None:
     """Play a single slot; its phase gets what was heard."""
-    t = _a_slot_after(now)
-    _observe_self(known, truth, t)
-    _record_attempt(known, truth, phase, t, silence_is_attempt)
-    _transmit(truth, radio, phase)
-    _merge(known, phase)
-
-
-@compiled()
-def _transmit(truth: _Truth, radio: _Radio, phase: Phase) -> None:
-    """Silence inactive robots, and fill in what the others hear."""
-    silence(phase.recipient, truth.is_active)
-    sender = decode_strongest(
-        truth.true_m,
-        phase.recipient,
-        radio.received_at_1_m_mw,
-        radio.noise_mw,
-        radio.threshold,
-        radio.hears_while_sending,
-    )
-    for b in range(sender.shape[0]):
-        for j in range(sender.shape[1]):  # an array's assignment takes seconds to compile
-            phase.heard[b, j] = sender[b, j]
-    silence(phase.heard, truth.is_active)
-
-
-@compiled()
-def _observe_self(known: _Known, truth: _Truth, t: Float[np.ndarray, "B"]) -> None:
-    """Let active robots observe themselves at t [windows]."""
-    write_own(
-        timestamp=known.timestamp,
-        believed_m=known.believed_m,
-        believed_mps=known.believed_mps,
-        observed_m=truth.observed_m,
-        observed_mps=truth.observed_mps,
-        now=t,
-        is_active=truth.is_active,
-    )
-
-
-@compiled()
-def _record_attempt(
-    known: _Known,
-    truth: _Truth,
-    phase: Phase,
-    t: Float[np.ndarray, "B"],
-    silence_is_attempt: bool,
-) -> None:
-    """Note whom active robots address in the slot that ends at t [windows]."""
-    write_attempt(
-        last_attempt=known.last_attempt,
-        recipient=phase.recipient,
-        now=t,
-        silence_is_attempt=silence_is_attempt,
-        is_active=truth.is_active,
-    )
-
-
-@compiled()
-def _merge(known: _Known, phase: Phase) -> None:
-    """Merge whole buffers of senders into those of the robots that heard them."""
-    merge_newer(
-        sent=known.timestamp,
-        heard=phase.heard,
-        timestamp=known.timestamp,
-        believed_m=known.believed_m,
-        believed_mps=known.believed_mps,
-        parent=known.parent,
-    )
-
-
-@compiled()
-def _a_slot_after(now: Float[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
-    """Return when the slot ends that begins now [windows]."""
-    t = np.empty_like(now)
-    for b in range(now.shape[0]):
-        t[b] = now[b] + SLOT_WINDOWS
-    return t
+    t = a_slot_after(now)
+    observe_self(known, truth, t)
+    record_attempt(known, truth, phase, t, silence_is_attempt)
+    transmit(truth, radio, phase)
+    merge(known, phase)

@@ -1,15 +1,12 @@
 """Effects of a channel beyond the paper's free space, from path loss to clocks, each in one place.
 
-An effect says whether a mission has it (`of`), how a title names it, and what it changes of a
-channel's numbers (`change`). From `EFFECTS`, the list of all, follow the channel that a mission
-flies, its title, what robots may know of it, and the table of `docs/channels.md`, whose sentences
-are the classes' own.
+From `EFFECTS`, the list of all, follow the channel that a mission flies, its title, what robots may
+know of it, and the table of `docs/channels.md`, whose sentences are the classes' own.
 """
 
-from abc import ABC, abstractmethod
 from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import ClassVar, NamedTuple, assert_never
+from typing import assert_never
 
 import numpy as np
 from jaxtyping import Float
@@ -17,58 +14,15 @@ from jaxtyping import Float
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.composed import Reception
+from swarm_mj.radio.effect import ChannelModel, Effect, MissionEffect, titled
 from swarm_mj.radio.fading import NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import FreeSpaceRadio
 from swarm_mj.radio.power_law import (
     TWO_RAY_EXPONENT,
-    PowerLaw,
     free_space_law,
     two_ray_breakpoint_m,
 )
 from swarm_mj.system.decibels import from_db
-from swarm_mj.system.fields import as_typed
-
-
-class ChannelModel(NamedTuple):
-    """The numbers of a channel: of mean powers, of reception, and of what is drawn once."""
-
-    law: PowerLaw  # of mean powers without shadowing [mW]
-    reception: Reception
-    shadowing_db: float = 0.0  # standard deviation; 0 is none [dB]
-    shadowing_distance_m: float = 1.0  # over which its correlation falls to 1/e [m]
-    clock_offset: float = 0.0  # the greatest, between robots [slots]
-    clock_drift: float = 0.0  # the greatest, either way [1]
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Effect(ABC):
-    """Something that a channel has and free space has not."""
-
-    @abstractmethod
-    def change(self, model: ChannelModel) -> ChannelModel:
-        """Return the numbers of a channel that has this effect, too."""
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class MissionEffect(Effect):
-    """An effect that numbers of the mission make.
-
-    A class names the fields of `Mission` that it `reads`, as no other does; its docstring is its
-    row in the documentation.
-    """
-
-    reads: ClassVar[tuple[str, ...]]
-    title: str  # the fields that count, and their values
-
-    def __init_subclass__(cls, *, reads: tuple[str, ...]) -> None:
-        """Take the fields of `Mission` that this effect and no other reads."""
-        super().__init_subclass__()
-        cls.reads = reads
-
-    @classmethod
-    @abstractmethod
-    def of(cls, mission: Mission) -> "MissionEffect | None":
-        """Return the effect that a mission has, or None."""
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,7 +50,7 @@ class PathLoss(
                 return None
             case "log-distance":  # Rappaport 2002, Eq. 4.69
                 return cls(
-                    title=_titled(
+                    title=titled(
                         path_loss=law,
                         loss_exponent=mission.loss_exponent,
                         reference_m=mission.reference_m,
@@ -107,7 +61,7 @@ class PathLoss(
             case "two-ray":
                 height_m = mission.antenna_height_m
                 return cls(
-                    title=_titled(path_loss=law, antenna_height_m=height_m),
+                    title=titled(path_loss=law, antenna_height_m=height_m),
                     breakpoint_m=two_ray_breakpoint_m(height_m, mission.frequency_hz),
                     exponent=TWO_RAY_EXPONENT,
                 )
@@ -137,7 +91,7 @@ class Shadowing(MissionEffect, reads=("shadowing_db", "shadowing_distance_m")):
         if mission.shadowing_db == 0.0:
             return None
         return cls(
-            title=_titled(
+            title=titled(
                 shadowing_db=mission.shadowing_db,
                 shadowing_distance_m=mission.shadowing_distance_m,
             ),
@@ -168,10 +122,10 @@ class Fading(MissionEffect, reads=("fading", "rician_k")):
             case "none":
                 return None
             case "rayleigh":
-                return cls(title=_titled(fading=law), rician_k=NO_LINE_OF_SIGHT)
+                return cls(title=titled(fading=law), rician_k=NO_LINE_OF_SIGHT)
             case "rician":
                 return cls(
-                    title=_titled(fading=law, rician_k=mission.rician_k),
+                    title=titled(fading=law, rician_k=mission.rician_k),
                     rician_k=mission.rician_k,
                 )
             case _:
@@ -193,7 +147,7 @@ class Erasure(MissionEffect, reads=("erasure",)):
         """Return the erasures, if any packet is lost."""
         if mission.erasure == 0.0:
             return None
-        return cls(title=_titled(erasure=mission.erasure), probability=mission.erasure)
+        return cls(title=titled(erasure=mission.erasure), probability=mission.erasure)
 
     def change(self, model: ChannelModel) -> ChannelModel:
         """Return a channel that loses this share."""
@@ -217,7 +171,7 @@ class Bursts(MissionEffect, reads=("burst_begin", "burst_end")):
         if mission.burst_begin == 0.0:
             return None
         return cls(
-            title=_titled(burst_begin=mission.burst_begin, burst_end=mission.burst_end),
+            title=titled(burst_begin=mission.burst_begin, burst_end=mission.burst_end),
             begin=mission.burst_begin,
             end=mission.burst_end,
         )
@@ -241,7 +195,7 @@ class HighPower(MissionEffect, reads=("high_power_fraction", "high_power_db")):
         if mission.num_high_power == 0:
             return None
         return cls(
-            title=_titled(
+            title=titled(
                 num_high_power=mission.num_high_power, high_power_db=mission.high_power_db
             ),
             num_robots=mission.num_high_power,
@@ -276,9 +230,9 @@ class Clocks(MissionEffect, reads=("clock_offset_s", "clock_drift_ppm")):
             return None
         titles: list[str] = []
         if mission.clock_offset_s > 0.0:
-            titles.append(_titled(clock_offset_s=mission.clock_offset_s))
+            titles.append(titled(clock_offset_s=mission.clock_offset_s))
         if mission.clock_drift_ppm > 0.0:
-            titles.append(_titled(clock_drift_ppm=mission.clock_drift_ppm))
+            titles.append(titled(clock_drift_ppm=mission.clock_drift_ppm))
         return cls(
             title=", ".join(titles),
             offset=mission.clock_offset_s / mission.slot_s,
@@ -342,8 +296,3 @@ def model_of(radio: FreeSpaceRadio, num_robots: int, effects: Iterable[Effect]) 
     for effect in effects:
         model = effect.change(model)
     return model
-
-
-def _titled(**numbers: str | float | int) -> str:
-    """Return fields of `Mission` and their values, as a title names them."""
-    return ", ".join(f"{name} {as_typed(value)}" for name, value in numbers.items())

@@ -15,7 +15,8 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Obstacles
 from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.composed import ComposedChannel, Reception
-from swarm_mj.radio.effects import Effect, HighPower, Obstruction, effects_of, model_of
+from swarm_mj.radio.effect import Effect
+from swarm_mj.radio.effects import HighPower, Obstruction, effects_of, model_of
 from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between

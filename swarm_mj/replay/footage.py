@@ -40,15 +40,16 @@ def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) 
     moves = farthest_m > NEAR * half_side_m
     if not moves and not is_tight:
         return Ground(centre_m=np.zeros((len(position_m), 2)), reach_m=max(half_side_m, farthest_m))
-    axis = 1 if moves else (0, 1)
-    low_m = np.min(position_m, axis=axis, keepdims=True)
-    high_m = np.max(position_m, axis=axis, keepdims=True)
+    low_m = np.min(position_m, axis=1)
+    high_m = np.max(position_m, axis=1)
+    if not moves:  # one square for all windows
+        low_m = np.broadcast_to(np.min(low_m, axis=0), low_m.shape)
+        high_m = np.broadcast_to(np.max(high_m, axis=0), high_m.shape)
     # Of constant size all the same: a changing scale would look like motion. And of some size,
     # also where a lone robot stands still.
     least_m = 0.0 if moves else 1.0
     reach_m = max(least_m, float(np.max(high_m - low_m)) / 2.0)
-    centre_m = np.broadcast_to((low_m + high_m)[:, 0] / 2.0, (len(position_m), 2))
-    return Ground(centre_m=centre_m, reach_m=reach_m)
+    return Ground(centre_m=(low_m + high_m) / 2.0, reach_m=reach_m)
 
 
 def shown_ground(position_m: Positions, mission: Mission) -> Ground:

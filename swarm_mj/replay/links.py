@@ -112,6 +112,11 @@ def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray
     return np.insert(at_m, 2, height_m, axis=-1)
 
 
+def flattened(at_m: Float[np.ndarray, "*S 3"]) -> Float[np.ndarray, "*S 2"]:
+    """Return the points on the ground below: what `lifted` was given [m]."""
+    return np.delete(at_m, 2, axis=-1)
+
+
 def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.ndarray, "L P 3"]:
     """Return points along parabolas that start and end at `base_m` above the ground [m].
 
@@ -211,9 +216,12 @@ def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]
 
 def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
     """Divide lines from start to end into pieces, as many of each [m]."""
-    start_m = lines_m[:, None, None, 0]
-    way_m = np.diff(lines_m, axis=1)[:, None]
-    return (start_m + pieces[None, :, :, None] * way_m).reshape(-1, 2, 2)
+    start_m, end_m = np.moveaxis(lines_m, 1, 0)
+    way_m = end_m - start_m
+    # [line, piece, its start or end, x or y]
+    along = pieces[None, :, :, None]
+    ends_m = start_m[:, None, None, :] + along * way_m[:, None, None, :]
+    return ends_m.reshape(-1, 2, 2)
 
 
 def shades(kind: LinkKind, links: LinkRows) -> UInt8[np.ndarray, "L 3"]:

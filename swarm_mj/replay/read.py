@@ -25,6 +25,7 @@ from swarm_mj.replay.links import (
     LinkMismatch,
     LinkRows,
     PacketPaths,
+    flattened,
 )
 from swarm_mj.replay.palette import Fate, LinkKind
 from swarm_mj.replay.rerun_log import TIMELINE
@@ -140,8 +141,8 @@ def _packets(columns: Columns) -> dict[Fate, PacketPaths]:
         strips = columns.get((layers.PACKET_ARCS[fate].path, "LineStrips3D:strips"))
         if strips is None:  # addressed packets have other fates than broadcasts
             continue
-        points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)[..., :2]
-        start_m = points_m[:, 0]
+        points_m = flattened(_numbers(strips).reshape(-1, SEGMENTS + 1, 3))
+        start_m = points_m[:, 0]  # the first point of each arc, and the last:
         # From the way that is drawn to the whole one.
         way_m = (points_m[:, -1] - start_m) / style.share
         found[fate] = PacketPaths(row=_rows(strips), start_m=start_m, end_m=start_m + way_m)

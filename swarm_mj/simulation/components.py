@@ -5,10 +5,13 @@ from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, TypedDict
 
+from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
+from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
+from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.gain_table import GainTable
 from swarm_mj.system.arguments import check_callable, name_of
 from swarm_mj.system.fields import setting
@@ -23,6 +26,14 @@ CALLED_WITH = {  # the kinds of components, and the arguments of each
     "scene": ("spec", "mission"),
 }
 TABLE = "table:"  # begins the name of a channel that is a table of gains
+
+
+class GivenParts(TypedDict, total=False):
+    """Keywords of `Swarm`: objects or names, of those kinds alone that are not the mission's."""
+
+    channel: Channel | VaryingChannel | str
+    controller: Controller | str
+    scene: Scene | str
 
 
 def _files(component: object) -> list[Path]:
@@ -41,7 +52,8 @@ class Components:
     Raises TypeError for what is neither a name nor called as its kind is.
     """
 
-    # Any admits objects; files and command lines hold names only.
+    # Any, since the reader of files makes no types that are protocols: files and command lines hold
+    # names only. Objects are checked for how they are called.
     channel: Any = setting(
         None, "who decodes whom; or table:FILE", shown="free space", reads=_files, **OWN
     )
@@ -57,10 +69,16 @@ class Components:
                 check_callable(kind, component, CALLED_WITH[kind])
 
     @property
-    def given(self) -> dict[str, Any]:
+    def given(self) -> GivenParts:
         """Those that are not the mission's own, by their kind."""
-        every = {"channel": self.channel, "controller": self.controller, "scene": self.scene}
-        return {kind: component for kind, component in every.items() if component is not None}
+        given: GivenParts = {}
+        if self.channel is not None:
+            given["channel"] = self.channel
+        if self.controller is not None:
+            given["controller"] = self.controller
+        if self.scene is not None:
+            given["scene"] = self.scene
+        return given
 
     @property
     def names(self) -> dict[str, str]:

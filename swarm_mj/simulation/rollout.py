@@ -2,7 +2,7 @@
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Generic, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Float
@@ -22,35 +22,48 @@ class WindowRecord:
     hops: Float[np.ndarray, "B"]  # mean depth of the parent trees [hops]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Summary:
-    """Costs of B missions over the windows flown; packets are totals.
+PerMission = Float[np.ndarray, "B"]
 
-    Packets of policies that address are delivered or lost, broadcasts are heard or not; counts of
-    the other kind are nan.
+Mean = TypeVar("Mean")
+Count = TypeVar("Count")
+SomeMean = TypeVar("SomeMean")  # or what stands where it is not defined
+SomeCount = TypeVar("SomeCount")  # likewise
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class FlownCosts(Generic[Mean, Count, SomeMean, SomeCount]):
+    """What the windows flown cost, of one mission or of several side by side.
+
+    Packets are totals. Those of policies that address are delivered or lost, broadcasts are heard
+    or not; counts of the other kind are not defined.
     """
 
-    num_windows: int
-    aoi_mean: Float[np.ndarray, "B"]  # age of information [windows]
-    velocity_variance_mean: Float[np.ndarray, "B"]  # [m²/s²]
-    velocity_variance_first: Float[np.ndarray, "B"]  # after the first window [m²/s²]
-    velocity_variance_last: Float[np.ndarray, "B"]  # after the last window [m²/s²]
+    num_windows: int  # that were flown
+    aoi_mean: Mean  # age of information, mean over windows [windows]
+    velocity_variance_mean: Mean  # mean over windows [m²/s²]
+    velocity_variance_first: Mean  # after the first window [m²/s²]
+    velocity_variance_last: Mean  # after the last window [m²/s²]
     task_cost_name: str | None = None  # as the controller calls it; None if it has none
-    task_cost_unit: str | None = None
-    task_cost_mean: Float[np.ndarray, "B"] | None = None
-    task_cost_first: Float[np.ndarray, "B"] | None = None  # after the first window
-    task_cost_last: Float[np.ndarray, "B"] | None = None  # after the last window
-    hops_mean: Float[np.ndarray, "B"]  # depth of the parent trees [hops]
-    complete_window: Float[np.ndarray, "B"]  # everyone had first heard of everyone, or nan
-    packets_sent: Float[np.ndarray, "B"]  # requests or broadcasts
-    packets_transmitted: Float[np.ndarray, "B"]  # all that were on the air, responses too
-    packets_attempted: Float[np.ndarray, "B"]  # requests
-    packets_delivered: Float[np.ndarray, "B"]
-    packets_lost: Float[np.ndarray, "B"]
-    packets_overheard: Float[np.ndarray, "B"]
-    packets_answered: Float[np.ndarray, "B"]
-    packets_heard: Float[np.ndarray, "B"]  # broadcasts that at least one robot decoded
-    hearers_per_packet: Float[np.ndarray, "B"]  # robots that decoded a broadcast; nan if none flew
+    task_cost_unit: str | None = None  # of the next three
+    task_cost_mean: Mean | None = None  # mean over windows
+    task_cost_first: Mean | None = None  # after the first window
+    task_cost_last: Mean | None = None  # after the last window
+    hops_mean: Mean  # depth of the parent trees, mean over windows [hops]
+    complete_window: SomeCount  # after which everyone had heard of everyone, if ever
+    packets_sent: Count  # requests or broadcasts
+    packets_transmitted: Count  # all that were on the air, responses too
+    packets_attempted: SomeCount  # requests
+    packets_delivered: SomeCount  # of these, decoded by the recipient
+    packets_lost: SomeCount  # and of these, not
+    packets_overheard: SomeCount  # receptions of what was meant for another
+    packets_answered: SomeCount  # responses that the first sender decoded
+    packets_heard: SomeCount  # broadcasts that at least one robot decoded
+    hearers_per_packet: SomeMean  # robots that decoded a broadcast, mean [robots]
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Summary(FlownCosts[PerMission, PerMission, PerMission, PerMission]):
+    """Costs of B missions over the windows flown: a number each, nan where it is not defined."""
 
 
 def rollout(swarm: Swarm, policy: Policy | None = None) -> Iterator[WindowRecord]:

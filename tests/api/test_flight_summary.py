@@ -9,7 +9,6 @@ import pytest
 
 import swarm_mj
 from swarm_mj.api.flight_summary import FlightSummary, as_lines
-from swarm_mj.simulation.rollout import Summary
 
 TINY = {"num_robots": 4, "num_windows": 3, "range_ratio": 2.0, "record": False}
 
@@ -27,12 +26,6 @@ def test_each_number_is_an_attribute_and_a_key(summary):
     assert summary.num_windows == 3
     assert summary.packets_delivered is None, "tdma broadcasts"
     assert {"aoi_mean", "packets_lost"} <= set(dir(summary))
-
-
-def test_it_begins_with_what_missions_side_by_side_are_summed_up_by():
-    """Its first names are those of `Summary`, in their order: a number there is one here."""
-    names = [spec.name for spec in fields(Summary)]
-    assert [spec.name for spec in fields(FlightSummary)][: len(names)] == names
 
 
 def test_it_is_a_dictionary_to_json_copies_and_pickles(summary):

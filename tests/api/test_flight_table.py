@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from rich.console import Console
 
+from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_numbers, flight_rows, flight_title
 from swarm_mj.api.run import AGE
 from swarm_mj.mission import PRESETS, paper
@@ -35,8 +36,9 @@ def shown(policy_name, task, its):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=7)
     policy = make_policy(policy_name, mission)
-    numbers = flight_numbers(mission, policy, its) | {"heard_share": 0.254}
-    rows = flight_rows(mission, numbers, 1.5)
+    numbers = flight_numbers(mission, policy, its)
+    ended = {"wall_seconds": 1.5, "interrupted": False, "heard_share": 0.254}
+    rows = flight_rows(mission, FlightSummary(**numbers, **ended))
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
         console.print(named_values("a title", rows, caption=AGE))

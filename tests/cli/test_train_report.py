@@ -15,7 +15,7 @@ from swarm_mj.cli.train_report import (
     verdicts,
 )
 from swarm_mj.learning.run_folder import Limits, TrainingRun
-from swarm_mj.learning.selection import Choice, Cost, Progress, Status
+from swarm_mj.learning.selection import Choice, Cost, CurveRow, HeldOutCosts, Progress, Status
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
 
@@ -23,9 +23,18 @@ RUN = TrainingRun(
     training=usual_settings("robot", paper("stationary"), (40,)),
     limits=Limits(decisions=200_000, patience=2),
 )
-FIRST = {"decisions": 0.0, "aoi": 48.0, "objective": 1.2, "aoi_tdma": 25.0}
-FIRST |= {"aoi_greedy_oracle": 12.0}
-BEST = FIRST | {"decisions": 10_000.0, "aoi": 21.5, "aoi_sem": 0.4, "objective": 0.5}
+
+
+def evaluation(decisions, minutes=0.0, references=None, **its):
+    """One of an age and an objective; its other costs are of no interest."""
+    others = ("aoi_steady", "velocity_variance", "packets_per_window", "delivery_ratio")
+    costs = HeldOutCosts(**dict.fromkeys(others, 0.5), **its)
+    return CurveRow(decisions=decisions, minutes=minutes, costs=costs, references=references or {})
+
+
+FLOWN = {"aoi_tdma": 25.0, "aoi_greedy_oracle": 12.0}
+FIRST = evaluation(0, references=FLOWN, aoi=48.0, objective=1.2)
+BEST = evaluation(10_000, references=FLOWN, aoi=21.5, aoi_sem=0.4, objective=0.5)
 CHOICE = Choice(
     decisions=10_000,
     run_decisions=20_000,
@@ -84,7 +93,7 @@ def test_losses_beyond_their_error_are_said_and_wins_are_not_boasted_of(others, 
 
 def test_an_oracle_that_has_not_flown_is_said():
     large = replace(RUN, training=replace(RUN.training, robots=(40, 200)))
-    row = {name: x for name, x in FIRST.items() if name != "aoi_greedy_oracle"}
+    row = replace(FIRST, references={"aoi_tdma": 25.0})
     for choice in (CHOICE, None):
         rows = report(large, Progress(decisions=20_000, curve=[row], choice=choice))
         assert rows["greedy-oracle"].startswith("not flown: it would take long with more than 100")
@@ -101,7 +110,7 @@ def test_a_training_that_did_not_help_is_said(init, name):
 
 
 def test_an_early_stop_is_said_with_the_way_on():
-    stalled = progress(CHOICE, BEST | {"decisions": 15_000.0}, BEST | {"decisions": 20_000.0})
+    stalled = progress(CHOICE, replace(BEST, decisions=15_000), replace(BEST, decisions=20_000))
     assert has_stopped_early(RUN, stalled)
     said = next(verdicts(RUN, stalled))
     assert said.startswith("Stopped early: the last 2 evaluations brought no gain.")
@@ -129,7 +138,7 @@ def test_flocks_are_judged_by_their_velocity_variance():
 
 
 SHORT = replace(RUN, limits=Limits(decisions=4_000))
-ROW = {"decisions": 1000.0, "minutes": 0.5, "aoi": 31.5, "aoi_sem": 0.25, "objective": 1.0}
+ROW = evaluation(1000, 0.5, aoi=31.5, aoi_sem=0.25, objective=1.0)
 
 
 def at(decisions, minutes, curve=()):
@@ -168,9 +177,9 @@ def heard_by(is_interrupted, statuses, terminal=False):
 
 
 def test_every_new_evaluation_is_a_line_and_those_of_earlier_sessions_are_not():
-    worse = ROW | {"decisions": 2000.0, "aoi": 35.0, "objective": 2.0}
-    better = ROW | {"decisions": 3000.0, "aoi": 25.0, "objective": 0.5}
-    better |= {"aoi_spatial_tdma": 21.0, "aoi_greedy_oracle": 12.0}
+    worse = evaluation(2000, 0.5, aoi=35.0, aoi_sem=0.25, objective=2.0)
+    flown = {"aoi_spatial_tdma": 21.0, "aoi_greedy_oracle": 12.0}
+    better = evaluation(3000, 0.5, flown, aoi=25.0, aoi_sem=0.25, objective=0.5)
     curves = ([ROW], [ROW, worse], [ROW, worse], [ROW, worse, better])
     statuses = [
         Status(progress=at(1_000 * n, float(n), curve)) for n, curve in enumerate(curves, start=1)

@@ -7,6 +7,7 @@ import torch
 from safetensors.torch import load_file
 
 from swarm_mj.learning.run_folder import CHECKPOINT, Limits, TrainingRun
+from swarm_mj.learning.selection import CurveRow, HeldOutCosts
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
@@ -28,6 +29,13 @@ def small_training(credit="robot", task="stationary", sizes=(5,), discount=None,
         "held_out": 2,
     }
     return replace(its, **usual | changes)
+
+
+def evaluation(decisions, **its):
+    """One of an age; what is not given is of no interest."""
+    others = ("aoi_steady", "velocity_variance", "packets_per_window", "delivery_ratio")
+    costs = {"aoi": 1.0, "objective": 1.0} | dict.fromkeys(others, 0.5) | its
+    return CurveRow(decisions=decisions, minutes=0.5, costs=HeldOutCosts(**costs))
 
 
 def go_on(_status):

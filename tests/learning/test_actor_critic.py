@@ -8,7 +8,7 @@ import torch
 from torch.distributions import Categorical
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import boltzmann_sample, make_model
+from swarm_mj.learning.ppo import draw, make_model
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import PRESETS
 
@@ -129,11 +129,11 @@ def test_a_teams_values_ask_for_the_nodes_that_count_only(preset, nodes, monkeyp
 def test_draws_have_the_frequencies_of_the_boltzmann_distribution():
     """Those of different robots are independent."""
     torch.manual_seed(1)
-    both = boltzmann_sample(torch.zeros(20_000, 2, 2)).float()
+    both = draw(torch.zeros(20_000, 2, 2)).float()
     assert abs(torch.corrcoef(both.T)[0, 1]) < 4.0 / np.sqrt(20_000)
     logits = torch.tensor([1.0, 0.0, -2.0, 2.5, -1e9])
     count = 40_000
-    drawn = torch.bincount(boltzmann_sample(logits.expand(count, 5)), minlength=5) / count
+    drawn = torch.bincount(draw(logits.expand(count, 5)), minlength=5) / count
     expected = torch.softmax(logits, 0)
     error = (expected * (1 - expected) / count).sqrt()
     assert torch.all((drawn - expected).abs() <= 4.0 * error)

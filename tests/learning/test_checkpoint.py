@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from small_runs import difference, run, small_training
+from small_runs import difference, evaluation, run, small_training
 
 from swarm_mj.learning.checkpoint import load, save
 from swarm_mj.learning.ppo import make_model, policy_of
@@ -82,11 +82,11 @@ def test_one_of_other_features_is_refused_by_their_names(kept, tmp_path, monkeyp
 
 
 def test_progress_comes_back_to_the_last_bit(tmp_path):
-    row = dict.fromkeys(("decisions", "aoi", "objective"), 1 / 3)
+    row = evaluation(0, aoi=1 / 3, objective=2 / 3)
     progress = Progress(
         minutes=0.1 + 0.2,
         next_replay=12,
-        curve=[row, row | {"train/explained_variance": math.nan}],
+        curve=[row, replace(row, training={"train/explained_variance": math.nan})],
         since_evaluation=Accumulator(seconds=1e-9 / 3, decisions=5, age_windows=0.1),
         optimiser={"train/entropy": 2 / 3},
     )
@@ -94,8 +94,8 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
     model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
     save(tmp_path / "c.pt", TRAINING, model, progress, {0: policy_of(model).acting_network()})
     again, networks = load(tmp_path / "c.pt", TRAINING, make_model(TRAINING))
-    assert math.isnan(again.curve[1].pop("train/explained_variance"))
-    progress.curve[1].pop("train/explained_variance")
+    assert math.isnan(again.curve[1].training.pop("train/explained_variance"))
+    progress.curve[1].training.pop("train/explained_variance")
     assert again == progress
     assert not difference(networks[0].state_dict(), policy_of(model).acting_network().state_dict())
 

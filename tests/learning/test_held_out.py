@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import torch
-from small_runs import small_training
+from small_runs import evaluation, small_training
 from tiny_policies import tiny_network
 
 from swarm_mj.learning.held_out import (
@@ -47,12 +47,12 @@ def test_means_are_those_of_the_missions_flown_one_by_one(sizes):
         errors.append(np.std(mean, ddof=1) / np.sqrt(3))
         attempted += sum(summary.packets_attempted[0] for summary, _ in flights)
         delivered += sum(summary.packets_delivered[0] for summary, _ in flights)
-    assert found["aoi"] == pytest.approx(sum(ages) / len(sizes))
-    assert found["aoi_steady"] == pytest.approx(sum(steady) / len(sizes))
-    assert found["aoi_sem"] == pytest.approx(np.sqrt(sum(e**2 for e in errors)) / len(sizes))
-    assert found["objective"] == pytest.approx(sum(objectives) / len(sizes))
-    assert found["packets_per_window"] == pytest.approx(attempted / (len(sizes) * 3 * 20))
-    assert found["delivery_ratio"] == pytest.approx(delivered / attempted)
+    assert found.aoi == pytest.approx(sum(ages) / len(sizes))
+    assert found.aoi_steady == pytest.approx(sum(steady) / len(sizes))
+    assert found.aoi_sem == pytest.approx(np.sqrt(sum(e**2 for e in errors)) / len(sizes))
+    assert found.objective == pytest.approx(sum(objectives) / len(sizes))
+    assert found.packets_per_window == pytest.approx(attempted / (len(sizes) * 3 * 20))
+    assert found.delivery_ratio == pytest.approx(delivered / attempted)
     assert attempted > 0
 
 
@@ -63,8 +63,8 @@ def test_eq17_flocks_are_judged_by_their_velocity_variance():
     variance = [
         flown(training, 5, HELD_OUT_SEED + b)[0].velocity_variance_mean[0] for b in range(2)
     ]
-    assert found["velocity_variance"] == pytest.approx(sum(variance) / 2)
-    assert found["objective"] == found["velocity_variance"] > 0.0
+    assert found.velocity_variance == pytest.approx(sum(variance) / 2)
+    assert found.objective == found.velocity_variance > 0.0
 
 
 def test_global_random_states_do_not_matter_and_are_left_alone():
@@ -83,7 +83,7 @@ def test_global_random_states_do_not_matter_and_are_left_alone():
 def test_the_seed_of_the_training_does_not_change_the_missions_and_one_has_no_error():
     found = [evaluate(small_training(seed=seed, held_out=1), NETWORK) for seed in (1, 2)]
     assert found[0] == found[1]
-    assert "aoi_sem" not in found[0]
+    assert found[0].aoi_sem is None
 
 
 # The choice at the end: on missions of its own, reported on others, next to other policies.
@@ -101,7 +101,7 @@ def network(seed):
 
 
 NETWORKS = {0: network(1), 64: network(2), 128: network(3)}
-CURVE = [{"decisions": float(at), "objective": 1.0} for at in NETWORKS]
+CURVE = [evaluation(at) for at in NETWORKS]
 
 
 def ages(policy, first):
@@ -120,7 +120,7 @@ def test_the_least_cost_on_fresh_missions_is_chosen_and_told_on_others():
     assert len(set(judged.values())) == 3
     assert choice.decisions == min(judged, key=judged.__getitem__)
     told = ages(flies(NETWORKS[choice.decisions]), TEST_SEED)
-    assert choice.kept.mean == pytest.approx(told.mean()) == pytest.approx(costs["aoi"])
+    assert choice.kept.mean == pytest.approx(told.mean()) == pytest.approx(costs.aoi)
     assert choice.kept.sem == pytest.approx(told.std(ddof=1) / np.sqrt(3))
     assert (choice.num_finalists, choice.num_missions, choice.run_decisions) == (3, 3, 128)
     for name in ("tdma", "spatial-tdma"):
@@ -164,7 +164,7 @@ def test_the_largest_flights_do_not_reach_the_next_ones_missions():
 
 
 def test_the_first_flies_beside_what_was_chosen_if_it_is_another():
-    worse = [CURVE[0] | {"objective": 9.0}, CURVE[1], CURVE[2] | {"objective": 9.0}]
+    worse = [evaluation(0, objective=9.0), CURVE[1], evaluation(128, objective=9.0)]
     choice, _ = choose(TRAINING, worse, NETWORKS, lambda _share: None)
     assert (choice.decisions, choice.num_finalists) == (64, 1)
     first = ages(flies(NETWORKS[0]), TEST_SEED)

@@ -141,7 +141,8 @@ def _load_compiled_functions():
     env.reset()
     for recipients in ([1, 1, 2, 3], [0, 1, 0, 3]):
         env.step(np.array(recipients))
-    sample(np.zeros((2, 3), dtype=np.float32), np.array([0.1, 0.9]))
+    for kind in (np.float32, np.float64):  # of stored policies and of those in training
+        sample(np.zeros((2, 3), dtype=kind), np.array([0.1, 0.9]))
     reference_columns(small_training(), [], lambda _share: None)
 
 
@@ -167,7 +168,7 @@ def learned(folder):
         held_out=10,
         evaluate_every=1_000,
     )
-    return [row["aoi"] for row in run(training, folder / "learned", 2_000).curve]
+    return [row.costs.aoi for row in run(training, folder / "learned", 2_000).curve]
 
 
 @pytest.fixture(scope="module")

@@ -161,10 +161,10 @@ def test_replays_of_a_training_are_counted():
 
 def test_a_curve_is_read_by_the_names_of_its_columns_and_empty_cells_are_left_out(tmp_path):
     path = tmp_path / "curve.csv"
-    path.write_text("decisions,aoi,aoi_sem,train/entropy\n0,60,4,\n128,30.5,,nan\n")
+    path.write_text("decisions,aoi,aoi_sem,aoi_tdma,train/entropy\n0,60,4,25,\n128,30.5,,,nan\n")
     first, second = read_curve(path)
-    assert first == {"decisions": 0.0, "aoi": 60.0, "aoi_sem": 4.0}
-    assert (second["aoi"], "aoi_sem" in second) == (30.5, False)
+    assert first == (0.0, 60.0, 4.0, {"tdma": 25.0})
+    assert second == (128.0, 30.5, None, {})
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "decisions,aoi\n0,x\n", "decisions,aoi\n0,\n"])

@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from small_runs import small_training
+from small_runs import evaluation, small_training
 
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
@@ -13,6 +13,7 @@ from swarm_mj.learning.selection import (
     Accumulator,
     Progress,
     candidates,
+    curve_row_of,
     finalists,
     num_missions,
     reserved_minutes,
@@ -21,11 +22,11 @@ from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED, TEST_SEED
 
 
 def curve(*objectives):
-    return [{"decisions": 10.0 * n, "objective": x} for n, x in enumerate(objectives)]
+    return [evaluation(10 * n, objective=x) for n, x in enumerate(objectives)]
 
 
 def at(rows):
-    return [row["decisions"] for row in rows]
+    return [row.decisions for row in rows]
 
 
 def test_the_first_and_the_best_three_are_candidates_in_their_order():
@@ -105,12 +106,30 @@ def test_the_best_is_the_least_objective_and_the_first_of_equals():
 
 
 def test_a_curve_is_a_table_even_if_later_rows_have_more_columns(tmp_path):
-    row = {"decisions": 10.0, "aoi": 1 / 3}
-    Progress(curve=[row, row | {"train/entropy": 0.5}]).write_curve(tmp_path / "curve.csv")
+    row = evaluation(10, aoi=1 / 3)
+    entropy = {"train/entropy": 0.5}
+    curve = [row, replace(row, training=entropy)]
+    Progress(curve=curve).write_curve(tmp_path / "curve.csv")
     with (tmp_path / "curve.csv").open(newline="") as file:
         first, second = csv.DictReader(file)
-    assert {name: float(x) for name, x in first.items() if x} == row
+    assert {name: float(x) for name, x in first.items() if x} == row.columns()
+    assert first["decisions"] == "10.0"
     assert float(second["train/entropy"]) == 0.5
+
+
+def test_an_evaluation_is_its_columns_and_comes_back_from_them():
+    """A cost that is not known has no column; a slash tells training from reference policies."""
+    row = replace(evaluation(64), references={"aoi_tdma": 3.0}, training={"rollout/aoi": 4.0})
+    columns = row.columns()
+    assert list(columns)[:4] == ["decisions", "minutes", "aoi", "aoi_steady"]
+    assert list(columns)[-3:] == ["objective", "aoi_tdma", "rollout/aoi"]
+    assert curve_row_of(columns) == row
+    known = evaluation(64, aoi_sem=0.25)
+    assert list(known.columns())[3] == "aoi_sem"
+    assert curve_row_of(known.columns()) == known
+    del columns["objective"]
+    with pytest.raises(KeyError, match="objective"):
+        curve_row_of(columns)
 
 
 def test_totals_are_per_mission_and_window():

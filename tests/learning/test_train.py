@@ -54,7 +54,7 @@ def whole(tmp_path_factory):
 
 
 def evaluated_at(progress):
-    return [row["decisions"] for row in progress.curve]
+    return [row.decisions for row in progress.curve]
 
 
 def test_evaluations_and_replays_come_at_the_start_at_intervals_and_at_the_end(whole):
@@ -66,7 +66,7 @@ def test_evaluations_and_replays_come_at_the_start_at_intervals_and_at_the_end(w
     assert len(list((folder / REPLAYS).iterdir())) == 2
     with (folder / CURVE).open(newline="") as file:
         rows = list(csv.DictReader(file))
-    assert [float(row["aoi"]) for row in rows] == [row["aoi"] for row in progress.curve]
+    assert [float(row["aoi"]) for row in rows] == [row.costs.aoi for row in progress.curve]
 
 
 def test_tensorboard_has_the_numbers_that_matter(whole):
@@ -74,12 +74,12 @@ def test_tensorboard_has_the_numbers_that_matter(whole):
     events = EventAccumulator(str(folder / TENSORBOARD)).Reload()
     assert set(events.Tags()["scalars"]) >= PROMISED
     logged = [(event.step, event.value) for event in events.Scalars("held_out/aoi")]
-    expected = [(row["decisions"], pytest.approx(row["aoi"])) for row in progress.curve]
+    expected = [(row.decisions, pytest.approx(row.costs.aoi)) for row in progress.curve]
     assert logged == expected
     entropy = [event.value for event in events.Scalars("train/entropy")]
     assert all(value > 0.0 for value in entropy)
     steps = {event.step for tag in events.Tags()["scalars"] for event in events.Scalars(tag)}
-    assert steps == {row["decisions"] for row in progress.curve}
+    assert steps == {row.decisions for row in progress.curve}
 
 
 def test_a_curve_that_is_ahead_of_the_checkpoint_is_put_right_on_resuming(tmp_path):
@@ -109,7 +109,7 @@ def test_an_interrupted_run_keeps_its_best_evaluation_and_chooses_later_and_anew
     assert progress.choice is None
     _, config = read_policy(tmp_path / "run" / POLICY)
     assert config.evaluation["first_seed"] == HELD_OUT_SEED
-    assert config.evaluation["objective"] == progress.best["objective"]
+    assert config.evaluation["objective"] == progress.best.costs.objective
 
     def not_yet(status):
         return status.what != "Choosing"
@@ -128,7 +128,7 @@ def judge(monkeypatch, objectives):
     evaluate, objectives = held_out.evaluate, iter(objectives)
 
     def judged(*arguments):
-        return evaluate(*arguments) | {"objective": next(objectives)}
+        return replace(evaluate(*arguments), objective=next(objectives))
 
     monkeypatch.setattr(held_out, "evaluate", judged)
 
@@ -181,7 +181,7 @@ def test_hand_written_policies_fly_once_and_are_flat_curves(whole):
         summary = summarise(list(rollout(swarm, make_policy(name, TRAINING.mission))))
         column = f"aoi_{name.replace('-', '_')}"
         expected = pytest.approx([summary.aoi_mean.mean()] * len(progress.curve))
-        assert [row[column] for row in progress.curve] == expected
+        assert [row.references[column] for row in progress.curve] == expected
         assert [event.value for event in events.Scalars(f"held_out/{column}")] == expected
 
 
@@ -199,9 +199,9 @@ def test_the_totals_of_an_evaluation_are_of_the_windows_since_the_last(whole):
     _, progress, heard = whole
     ages = {decisions: aoi for decisions, evaluated, aoi, _ in heard if evaluated is None}
     for before, row in zip(progress.curve, progress.curve[1:], strict=False):
-        its = [age for at, age in ages.items() if before["decisions"] < at <= row["decisions"]]
+        its = [age for at, age in ages.items() if before.decisions < at <= row.decisions]
         assert len(its) == 16
-        assert row["rollout/aoi"] == pytest.approx(sum(its) / 16)
+        assert row.training["rollout/aoi"] == pytest.approx(sum(its) / 16)
 
 
 def test_a_better_policy_takes_the_place_of_the_last_and_a_worse_one_does_not(
@@ -283,7 +283,7 @@ def test_a_budget_is_met_by_whole_rollouts_and_a_run_that_is_done_does_nothing_m
     training, heard = small_training(held_out=1), []
     for budget, made in ((32, 32), (33, 64)):
         progress = run(training, tmp_path / f"{budget}", budget)
-        assert progress.decisions == progress.curve[-1]["decisions"] == made
+        assert progress.decisions == progress.curve[-1].decisions == made
     again = run(training, tmp_path / "33", 64, heard.append, is_resumed=True)
     assert again.curve == progress.curve
     assert heard == []

@@ -16,10 +16,9 @@ from swarm_mj.mission import Mission, paper
 from swarm_mj.mission.surroundings import FadingLaw, PathLossLaw
 from swarm_mj.protocol.packets import slot_bytes
 from swarm_mj.radio.carrier_sensing import CarrierSensing, usual_busy_dbm
+from swarm_mj.radio.effect import Effect, MissionEffect
 from swarm_mj.radio.effects import (
     EFFECTS,
-    Effect,
-    MissionEffect,
     Obstruction,
     beyond_free_space,
     effects_of,

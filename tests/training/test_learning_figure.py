@@ -42,10 +42,10 @@ def test_the_curve_is_drawn_with_the_levels_and_a_caption(results, tmp_path, mon
     assert (first, second) == ("learning.svg", "learning.png")
     (axes,) = figure.axes
     rows = read_curve(program.RESULTS / program.CURVE)
-    assert axes.lines[0].get_xdata().tolist() == [row["decisions"] for row in rows]
-    assert axes.lines[0].get_ydata().tolist() == [row["aoi"] for row in rows]
+    assert axes.lines[0].get_xdata().tolist() == [row.decisions for row in rows]
+    assert axes.lines[0].get_ydata().tolist() == [row.aoi for row in rows]
     (band,) = axes.collections
-    low = rows[0]["aoi"] - rows[0]["aoi_sem"]
+    low = rows[0].aoi - rows[0].aoi_sem
     assert band.get_paths()[0].vertices[:, 1].tolist().count(pytest.approx(low)) > 0
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
     assert labels == [program.LABEL, "TDMA 33.0", "spatial TDMA 26.0"]

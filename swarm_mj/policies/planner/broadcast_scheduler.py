@@ -6,9 +6,9 @@ transmit at once: less valuable at that moment, but news then travels on many wa
 several first transmitters are followed for a few slots, and the one that leaves the team youngest
 is taken.
 
-A packet that raises T^{j,k} by r has the value r² times a weight of receiver j and subject
-k, times the probability that it decodes; timestamps are expected ones. Index order: `i` sends, `j`
-receives. Times are in slots, float32, which keeps them exact for 8 million windows.
+A packet has the value of its news (`news`) times the probability that it decodes; timestamps are
+expected ones. Index order: `i` sends, `j` receives. Times are in slots, float32, which keeps them
+exact for 8 million windows.
 
 The first flight compiles these functions, so there are few, and they write loops where an array
 expression or a sort would take numba seconds to compile. They fill arrays that they are given, as
@@ -20,7 +20,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.protocol.timestamps import merge_expected, observe_own, rise
+from swarm_mj.policies.planner.news import value_of_news
+from swarm_mj.protocol.timestamps import merge_expected, observe_own
 from swarm_mj.radio.links import (
     ROUNDING,
     Links,
@@ -279,28 +280,6 @@ def _write_gains(timestamp: Float32[np.ndarray, "N N"], problem: Problem, search
         for j in range(timestamp.shape[0]):
             gain[i, j] = 0.0
             if problem.lone[i, j] > 0.0:
-                gain[i, j] = _value_of_rise(timestamp[i], timestamp[j], problem.weight[j])
+                gain[i, j] = value_of_news(timestamp[i], timestamp[j], problem.weight[j])
                 if gain[i, j] > 0.0:
                     has_news[i] = True
-
-
-# Adding in any order lets the compiler use its vectors. Whole slots add up exactly; products to
-# rounding, so robots that plan alike need machines alike.
-@compiled(makes_arrays=False, fastmath={"reassoc", "nnan", "nsz"})
-def _value_of_rise(
-    newer: Float32[np.ndarray, "N"],
-    older: Float32[np.ndarray, "N"],
-    weight: Float32[np.ndarray, "N"],
-) -> float:
-    """Return the value of raising T from one row to another, summed over subjects."""
-    total = np.float32(0.0)
-    for k in range(older.shape[0]):
-        total += _weighed(rise(newer[k], older[k]), weight[k])
-    return float(total)
-
-
-# Apart from `_value_of_rise`, whose permission to reorder sums would extend to this product.
-@compiled(makes_arrays=False)
-def _weighed(r: np.floating, weight: np.floating) -> np.floating:
-    """Return a squared rise times its weight, multiplied in this order."""
-    return r * (weight * r)

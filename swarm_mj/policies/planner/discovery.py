@@ -108,5 +108,5 @@ class Discovery:
     ) -> Bool[np.ndarray, "N"]:
         """Return the robots that i knows within some ranges of a place."""
         apart_m = view.position_m[i] - position_m
-        is_near = np.hypot(apart_m[:, 0], apart_m[:, 1]) < ranges * self._range_m
+        is_near = np.hypot(*apart_m.T) < ranges * self._range_m
         return is_near & view.is_known[i]
