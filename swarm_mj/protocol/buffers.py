@@ -203,8 +203,7 @@ def merge_newer(
         believed_mps: The velocities of M, [B N N 2], [m/s].
         parent: P, [B N N].
     """
-    num_missions, num_robots = heard.shape
-    for b in range(num_missions):
+    for b in range(heard.shape[0]):
         # Packets are read from the buffers before the phase: a copy where a sender also decodes,
         # which only the reference preset lets happen; else no row is both read and written.
         sent_t = sent[b]
@@ -216,23 +215,79 @@ def merge_newer(
             sent_m = sent_m.copy()
             sent_mps = sent_mps.copy()
             sent_parent = sent_parent.copy()
-        for i in range(num_robots):
-            j = heard[b, i]
-            if j == i:
-                continue
-            for k in range(num_robots):
-                if is_newer(sent_t[j, k], timestamp[b, i, k]):
-                    timestamp[b, i, k] = sent_t[j, k]
-                    for axis in range(2):
-                        believed_m[b, i, k, axis] = sent_m[j, k, axis]
-                        believed_mps[b, i, k, axis] = sent_mps[j, k, axis]
-                    parent[b, i, k] = i if k == j else _kept_parent(sent_parent[j, k], sent_t, j)
+        _take_newer(
+            sent_t=sent_t,
+            sent_m=sent_m,
+            sent_mps=sent_mps,
+            sent_parent=sent_parent,
+            heard=heard[b],
+            timestamp=timestamp[b],
+            believed_m=believed_m[b],
+            believed_mps=believed_mps[b],
+            parent=parent[b],
+        )
+
+
+@compiled()
+def _merge_written(
+    sent: Float[np.ndarray, "B N N"],
+    sent_m: Float[np.ndarray, "B N N 2"],
+    sent_mps: Float[np.ndarray, "B N N 2"],
+    sent_parent: Int[np.ndarray, "B N N"],
+    heard: Int[np.ndarray, "B N"],
+    timestamp: Float[np.ndarray, "B N N"],
+    believed_m: Float[np.ndarray, "B N N 2"],
+    believed_mps: Float[np.ndarray, "B N N 2"],
+    parent: Int[np.ndarray, "B N N"],
+) -> None:
+    """Merge packets that were written from other arrays than those that are merged into."""
+    for b in range(heard.shape[0]):
+        _take_newer(
+            sent_t=sent[b],
+            sent_m=sent_m[b],
+            sent_mps=sent_mps[b],
+            sent_parent=sent_parent[b],
+            heard=heard[b],
+            timestamp=timestamp[b],
+            believed_m=believed_m[b],
+            believed_mps=believed_mps[b],
+            parent=parent[b],
+        )
+
+
+@compiled()
+def _take_newer(
+    sent_t: Float[np.ndarray, "N N"],
+    sent_m: Float[np.ndarray, "N N 2"],
+    sent_mps: Float[np.ndarray, "N N 2"],
+    sent_parent: Int[np.ndarray, "N N"],
+    heard: Int[np.ndarray, "N"],
+    timestamp: Float[np.ndarray, "N N"],
+    believed_m: Float[np.ndarray, "N N 2"],
+    believed_mps: Float[np.ndarray, "N N 2"],
+    parent: Int[np.ndarray, "N N"],
+) -> None:
+    """Replace the entries of one mission's robots by newer ones in packets."""
+    num_robots = heard.shape[0]
+    for i in range(num_robots):
+        j = heard[i]
+        if j == i:
+            continue
+        for k in range(num_robots):
+            if is_newer(sent_t[j, k], timestamp[i, k]):
+                timestamp[i, k] = sent_t[j, k]
+                for axis in range(2):
+                    believed_m[i, k, axis] = sent_m[j, k, axis]
+                    believed_mps[i, k, axis] = sent_mps[j, k, axis]
+                parent[i, k] = i if k == j else _kept_parent(sent_parent[j, k], sent_t, j)
 
 
 def merge(
     buffers: Buffers,
     heard: Int[np.ndarray, "B N"],
     sent: Float[np.ndarray, "B N N"] | None = None,
+    *,
+    written: Buffers | None = None,
 ) -> None:
     """Merge the packets that robots decoded into their buffers, as `merge_newer` says.
 
@@ -240,7 +295,22 @@ def merge(
         buffers: The robots' buffers, written in place.
         heard: The sender that each robot decoded, [B N]; itself is nobody.
         sent: T of the entries in each robot's packet, [B N N], [windows]; None is the whole buffer.
+        written: What packets hold, where that is no longer what their senders know: other arrays of
+            T, M and P. None: the senders' buffers as they are.
     """
+    if written is not None:
+        _merge_written(
+            sent=written.timestamp if sent is None else sent,
+            sent_m=written.position_m,
+            sent_mps=written.velocity_mps,
+            sent_parent=written.parent,
+            heard=heard,
+            timestamp=buffers.timestamp,
+            believed_m=buffers.position_m,
+            believed_mps=buffers.velocity_mps,
+            parent=buffers.parent,
+        )
+        return
     merge_newer(
         sent=buffers.timestamp if sent is None else sent,
         heard=heard,

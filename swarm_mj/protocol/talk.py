@@ -22,9 +22,11 @@ def talk_over(channel: Channel | VaryingChannel, buffers: Buffers) -> Talk:
     """
     # Packets that arrive late carry older entries, so merging and observing change places.
     if isinstance(channel, AsynchronousChannel):
+        under_way = asynchronous_window.UnderWay()
+        late = {"channel": channel, "under_way": under_way}
         return Talk(
-            window=partial(asynchronous_window.window, channel=channel),
-            broadcast=partial(asynchronous_window.broadcast, channel=channel),
+            window=partial(asynchronous_window.window, **late),
+            broadcast=partial(asynchronous_window.broadcast, **late),
         )
     # The paper's missions: in one compiled call a window takes a third of the time. A subclass of
     # its radio may decode otherwise, and where only some entries fit someone must choose them.

@@ -11,7 +11,7 @@ from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int, UInt64
+from jaxtyping import Bool, Float, Int, UInt64
 
 from swarm_mj.radio.composed import ComposedChannel, Reception, faded_powers, is_lost
 from swarm_mj.radio.free_space import Channel
@@ -34,6 +34,9 @@ class Arrivals(NamedTuple):
     heard_late: Int[np.ndarray, "B N"]  # whose late packet j decoded; itself: none
     punctual: Int[np.ndarray, "B N"]  # whom i addressed now, if that packet comes in time
     heard_now: Int[np.ndarray, "B N"]  # whose punctual packet j decoded; itself: none
+    # Whose own packet of this slot had begun when what it decoded ended: what robots learn so is
+    # not in that packet. Only by the authors' half-duplex rule does anyone decode so.
+    learned_too_late: Bool[np.ndarray, "B N"]
 
 
 class AsynchronousChannel:
@@ -99,11 +102,17 @@ class AsynchronousChannel:
         late = np.where(is_late[LAST], self._recipient[LAST], silence)
         punctual = np.where(is_late[NOW], silence, self._recipient[NOW])
         came_late = np.take_along_axis(late, heard, axis=1) != heard
+        # Packets of one length that do not overlap come one after the other.
+        begun_before = np.take_along_axis(self._lag[LAST], heard, axis=1) - 1.0
+        begun_now = np.take_along_axis(self._lag[NOW], heard, axis=1)
+        apart = np.abs(np.where(came_late, begun_before, begun_now) - self._lag[NOW])
+        sends = self._recipient[NOW] != silence
         return Arrivals(
             late=late,
             heard_late=np.where(came_late, heard, silence),
             punctual=punctual,
             heard_now=np.where(came_late, silence, heard),
+            learned_too_late=sends & (heard != silence) & (apart < AIRTIME),
         )
 
 

@@ -7,7 +7,7 @@ from turns import settled
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.protocol.asynchronous_window import window
+from swarm_mj.protocol.asynchronous_window import UnderWay, window
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.radio.asynchronous import AIRTIME, GUARD, AsynchronousChannel, decode_overlapping
 from swarm_mj.radio.composed import ComposedChannel, Reception
@@ -200,7 +200,8 @@ def lagging():
 def play(channel, buffers, recipient, now):
     position_m = np.array([[[0.0, 0.0], [10.0, 0.0], [20.0, 0.0]]])
     states = RobotStates(position_m=position_m, velocity_mps=np.zeros((1, 3, 2)))
-    return window(buffers, *settled(states, np.array([recipient])), channel, np.array([now]))
+    turn = settled(states, np.array([recipient]))
+    return window(buffers, *turn, channel, np.array([now]), UnderWay())
 
 
 def test_a_late_request_is_not_answered_and_carries_what_was_known_when_it_was_sent():

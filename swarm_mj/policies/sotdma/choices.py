@@ -59,27 +59,33 @@ def best_slot(frame: Frame, k: int, own: int, min_gain: float, is_marked: Marks)
 
 
 @compiled()
-def first_slots(
+def work_out_slots(
+    slots: Int[np.ndarray, "N"],
+    done: int,
+    num: int,
     order: Int[np.ndarray, "N"],
     is_known: Bool[np.ndarray, "N"],
     power: Float[np.ndarray, "N N"],
     rule: Rule,
-) -> Int[np.ndarray, "N"]:
-    """Return all first slots: the first of the order have one each, the others choose in turn.
+) -> None:
+    """Fill in the first slots of the first `num` of the order, of whom `done` have theirs.
 
-    A robot that works this out does not choose for robots that it does not know.
+    The first of the order have one slot each, the others choose in turn. A robot that works this
+    out does not choose for robots that it does not know.
     """
     frame = empty_frame(power, rule)
-    slots = np.zeros(order.shape[0], dtype=np.int64)
+    for place in range(done):
+        k = order[place]
+        if is_known[k]:
+            add(frame, int(slots[k]), k)
     no_marks = np.zeros(frame.heard.shape, dtype=np.bool_)
-    for place in range(order.shape[0]):
+    for place in range(done, num):
         k = order[place]
         slots[k] = place % rule.num_slots
         if is_known[k]:
             if place >= rule.num_slots:
                 slots[k] = best_slot(frame, k, int(slots[k]), 0.0, no_marks)
             add(frame, int(slots[k]), k)
-    return slots
 
 
 @compiled()

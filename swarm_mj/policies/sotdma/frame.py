@@ -138,7 +138,7 @@ def _start(frame: Frame) -> int:
 #
 # These are bits: of 64 subjects k at a time in a word, which a robot that hears another merges with
 # a single `or`. Row i is what robot i knows, and column w S + t is what it knows of the w-th 64
-# subjects in the trial of slot t.
+# subjects in the trial of slot t. Subjects are the robots that transmit.
 WORD = 64  # subjects in a word
 Known = UInt64[np.ndarray, "C"]  # of one robot
 Words = UInt64[np.ndarray, "R C"]  # rows of them
@@ -152,18 +152,21 @@ def mean_ages(frame: Frame, tried: Heard, own: int) -> Float[np.ndarray, "F"]:
     """
     num_slots, num_robots = tried.shape
     start = _start(frame)
-    num_columns = -(-num_robots // WORD) * num_slots
+    num_subjects = np.sum(frame.slot != NOWHERE) + (frame.slot[own] == NOWHERE)
+    num_columns = -(-num_subjects // WORD) * num_slots
     known = np.zeros((num_robots, num_columns), np.uint64)
     # What k's first packet makes T of k younger by, in binary: row p has the digits of 2 ** p.
     num_digits = int(math.log2(start + num_slots)) + 1
     younger = np.zeros((num_digits, num_columns), np.uint64)
     of_itself = np.zeros(num_slots)
+    subject = -1
     for k in range(num_robots):
         if k != own and frame.slot[k] == NOWHERE:
             continue
-        bit = np.uint64(1) << np.uint64(k % WORD)
+        subject += 1
+        bit = np.uint64(1) << np.uint64(subject % WORD)
         for t in range(num_slots):
-            c = k // WORD * num_slots + t
+            c = subject // WORD * num_slots + t
             slot = t if k == own else frame.slot[k]
             by = slot + 1 + start
             known[k, c] = bit
@@ -192,6 +195,7 @@ def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.
     everyone = ~np.zeros((1, num_columns), np.uint64)  # the number 1 of each subject, in binary
     news = np.empty(num_columns, np.uint64)
     gained = np.zeros(num_columns, np.int64)
+    learned_in = np.full(num_robots, -1)  # the last slot in which each learned anything
     for n in range(last + num_slots):
         s = n % num_slots
         if n < last:
@@ -206,7 +210,11 @@ def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.
             # In place: a robot that transmits decodes nothing, so its row is as it was sent.
             j = frame.heard[s, i]
             k = tried[s, i]
-            if (j != i or k != i) and _learn(known[i], known[j], known[k], s, num_slots, news):
+            # Who learned nothing since this slot of the last frame tells nothing new.
+            tells = j != i and learned_in[j] >= n - num_slots
+            tells |= k != i and learned_in[k] >= n - num_slots
+            if tells and _learn(known[i], known[j], known[k], s, num_slots, news):
+                learned_in[i] = n
                 _weigh(news, value, times, gained)
     for i in range(num_robots):
         _weigh(known[i], younger, num_slots, gained)

@@ -23,16 +23,19 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.about import Information, Listed, Look, PairMemory, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy, TeamView, team_views
 from swarm_mj.policies.sotdma import slot_table
-from swarm_mj.policies.sotdma.choices import choices_before, chosen, first_slots
+from swarm_mj.policies.sotdma.choices import choices_before, chosen
+from swarm_mj.policies.sotdma.first_slots import FirstSlots, believed_powers
 from swarm_mj.policies.sotdma.frame import Rule, frame_slots
-from swarm_mj.policies.sotdma.slot_table import NO_PLACE, SlotTable, place_of
+from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
-from swarm_mj.radio.power_law import PowerLaw, powers_between, write_powers
+from swarm_mj.radio.power_law import PowerLaw, write_powers
 from swarm_mj.system.compiled import compiled
+
+MAX_ROBOTS = 250  # with more, the first slots take minutes, and frames begin late in a mission
 
 
 class SelfOrganisedTdma(BroadcastPolicy):
@@ -75,7 +78,15 @@ class SelfOrganisedTdma(BroadcastPolicy):
         return cls(mission)
 
     def __init__(self, mission: Mission) -> None:
-        """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        """Prepare the policy for the mission's radio, in free space unless informed otherwise.
+
+        Raises ValueError for a team that is too large to work out its first slots.
+        """
+        if mission.num_robots > MAX_ROBOTS:
+            raise ValueError(
+                f"sotdma flies teams of up to {MAX_ROBOTS} robots, not of {mission.num_robots:,}: "
+                "each robot works out slots for all; choose fewer robots, or spatial-tdma"
+            )
         self._turns = SpatialTdma(mission)
         self._belief = Belief(radio=radio_of(mission))
         # Packets say whom their senders heard only if they hold all of T and P as before the slot.
@@ -121,6 +132,7 @@ class SotdmaTeam:
         self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
         self._first_slot: int | None = None  # of the first frame, known from the first decision on
         self.table: SlotTable | None = None  # there is none before the first frame
+        self._first: FirstSlots  # made with the table
 
     def transmits(
         self, view: TeamView, in_turn: Bool[np.ndarray, "N"], draw: Float[np.ndarray, "N"]
@@ -134,8 +146,14 @@ class SotdmaTeam:
             return in_turn
         is_known = view.is_known | np.eye(len(self._order), dtype=bool)
         if self.table is None:
-            slots = self._first_slots(view.position_m, is_known)
-            self.table = slot_table.empty_table(slots, self._rule.num_slots)
+            self._first = FirstSlots(
+                order=self._order,
+                position_m=view.position_m,
+                is_known=is_known,
+                law=self._law,
+                rule=self._rule,
+            )
+            self.table = slot_table.empty_table(self._first.own(), self._rule.num_slots)
         known = self._last_transmissions(view)
         self._read(self.table, view, known, slot)
         self._choose(self.table, view, is_known, slot)
@@ -179,6 +197,7 @@ class SotdmaTeam:
         after = choices_before(slot + 1, len(order), self._rule)
         for turn in range(first, after):
             i = int(order[turn % len(order)])
+            self._complete(table, i, is_known[i])
             table.slots[i, i] = chosen(
                 i=i,
                 slots=table.slots[i],
@@ -187,9 +206,15 @@ class SotdmaTeam:
                 is_marked=slot_table.marks(table, i, slot, self._rule),
                 order=order,
                 slot=slot,
-                power=self._powers(view.position_m[i], is_known[i]),
+                power=believed_powers(view.position_m[i], is_known[i], self._law),
                 rule=self._rule,
             )
+
+    def _complete(self, table: SlotTable, i: int, is_known: Bool[np.ndarray, "N"]) -> None:
+        """Let robot i work out the first slots of those it knows that never announced another."""
+        silent = is_known & (table.announced[i] == LONG_AGO)
+        silent[i] = False  # it has its own
+        table.slots[i, silent] = self._first.of(i, silent)[silent]
 
     def _are_in_need(
         self,
@@ -202,26 +227,6 @@ class SotdmaTeam:
         """Return who lost a neighbour, or was lost by one, as far as it knows."""
         is_near = is_known & _is_in_range(view.position_m, self._law, self._rule.threshold)
         return slot_table.are_in_need(table, known, is_near, slot, self._rule)
-
-    def _first_slots(
-        self, position_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"]
-    ) -> Int[np.ndarray, "N N"]:
-        """Return everyone's first slots as each robot works them out."""
-        slots = np.empty(is_known.shape, dtype=np.int64)
-        done = {}  # robots that believe the same need it once
-        for i in range(len(slots)):
-            believed = (position_m[i].tobytes(), is_known[i].tobytes())
-            if believed not in done:
-                power = self._powers(position_m[i], is_known[i])
-                done[believed] = first_slots(self._order, is_known[i], power, self._rule)
-            slots[i] = done[believed]
-        return slots
-
-    def _powers(
-        self, position_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"]
-    ) -> Float[np.ndarray, "N N"]:
-        """Return powers between robots that one robot knows, as it believes [noise]."""
-        return powers_between(position_m, self._law) * is_known[:, None] * is_known[None, :]
 
 
 @compiled()

@@ -27,7 +27,9 @@ RECENT_WEIGHT = 0.1  # of the last packet in the share that were decoded
 class SlotTable(NamedTuple):
     """The memory of every robot."""
 
-    slots: Int[np.ndarray, "N N"]  # of the frame, in which it believes each to transmit
+    # Of the frame, in which it believes each to transmit. Before anything is announced others have
+    # first slots, which stand here once a choice needs them.
+    slots: Int[np.ndarray, "N N"]
     announced: Int[np.ndarray, "N N"]  # when it last knows that each transmitted
     decoded: Int32[np.ndarray, "N N"]  # when it last decoded a packet of each
     got_through: Int32[np.ndarray, "N N"]  # its own last packet that such a packet knew of
@@ -38,12 +40,12 @@ class SlotTable(NamedTuple):
     missed_at: Int32[np.ndarray, "N F"]  # when it last learned so
 
 
-def empty_table(slots: Int[np.ndarray, "N N"], num_slots: int) -> SlotTable:
-    """Return the memory of robots that believe in these slots and remember nothing else."""
-    num_robots = len(slots)
-    pairs = slots.shape
+def empty_table(own: Int[np.ndarray, "N"], num_slots: int) -> SlotTable:
+    """Return the memory of robots that have these slots and remember nothing."""
+    num_robots = len(own)
+    pairs = (num_robots, num_robots)
     return SlotTable(
-        slots=slots,
+        slots=np.diag(own),
         announced=np.full(pairs, LONG_AGO),
         decoded=np.full(pairs, LONG_AGO, dtype=np.int32),
         got_through=np.full(pairs, LONG_AGO, dtype=np.int32),

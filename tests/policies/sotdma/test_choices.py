@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from small_frames import NUM_ROBOTS, NUM_SLOTS, RULE, aged, frame_of, team
 
-from swarm_mj.policies.sotdma.choices import best_slot, choices_before, chosen, first_slots
+from swarm_mj.policies.sotdma.choices import best_slot, choices_before, chosen, work_out_slots
 from swarm_mj.policies.sotdma.frame import NOWHERE
 
 
@@ -66,7 +66,9 @@ def test_the_first_of_the_order_have_a_slot_each_and_the_others_choose_in_turn(u
     is_known = ~np.isin(np.arange(NUM_ROBOTS), unknown)
     order, power = np.random.default_rng(4).permutation(NUM_ROBOTS), team(4)[1]
     power = power * is_known * is_known[:, None]
-    slots = first_slots(order, is_known, power, RULE)
+    slots = np.zeros(NUM_ROBOTS, dtype=np.int64)
+    for done, num in ((0, 3), (3, 7), (7, NUM_ROBOTS)):  # in parts, as they are needed
+        work_out_slots(slots, done, num, order, is_known, power, RULE)
     assert slots[order[:NUM_SLOTS]].tolist() == list(range(NUM_SLOTS))
     for place in range(NUM_SLOTS, NUM_ROBOTS):
         k, so_far = order[place], np.full(NUM_ROBOTS, NOWHERE)

@@ -178,18 +178,32 @@ def test_robots_choose_in_common_order_from_the_second_frame_on(monkeypatch):
     assert min(chose)[0] >= 11
 
 
-def test_robots_that_believe_the_same_work_out_the_same_first_slots():
-    """The one that believes otherwise may work out others; all own the slots of their own table."""
+def test_robots_transmit_in_their_own_slots():
     view = row()
     view.position_m[5] = view.position_m[5, ::-1].copy()
     team = begun(view)
     slots = team.table.slots
-    others = np.delete(SILENCE, 5)
-    assert np.all(slots[others] == slots[0])
     for slot in range(FIRST + 1, FIRST + 11):
         transmits = asked(team, view, slot)
         np.testing.assert_array_equal(transmits, np.diagonal(slots) == slot - FIRST)
         np.testing.assert_array_equal(team.table.sent == slot - FIRST, transmits)
+
+
+def test_a_robot_that_chooses_knows_first_slots_of_all_who_announced_none():
+    """The first choice comes after a frame, in which robot 3 was heard in slot 2."""
+    team = begun(row())
+    i = int(ORDER[0])
+    team.table.announced[i, 3], team.table.slots[i, 3] = 2, 2
+    expected = team._first.of(i, SILENCE >= 0).copy()
+    expected[3] = 2
+    team._complete(team.table, i, SILENCE >= 0)
+    np.testing.assert_array_equal(team.table.slots[i], expected)
+
+
+def test_teams_too_large_for_first_slots_are_refused():
+    with pytest.raises(ValueError, match=r"up to 250 robots, not of 1,000: .*spatial-tdma"):
+        make_policy("sotdma", paper("stationary", num_robots=1000))
+    make_policy("sotdma", paper("stationary", num_robots=250))
 
 
 def test_robots_in_need_contend_where_nobody_owns_the_slot():

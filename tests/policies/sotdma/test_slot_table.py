@@ -20,7 +20,9 @@ RULE = Rule(threshold=1.0, num_slots=3, contention_every=4)
 
 def memory():
     """Of three robots that believe that robot k transmits in slot k."""
-    return empty_table(np.tile(np.arange(3), (3, 1)), 3)
+    table = empty_table(np.arange(3), 3)
+    table.slots[...] = np.arange(3)
+    return table
 
 
 def test_every_fourth_slot_is_of_no_frame_and_the_others_count_on():
