@@ -17,7 +17,7 @@ from notebook_page import page_of
 import swarm_mj
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arenas import ARENAS
-from swarm_mj.system.fields import about_of, as_typed, range_of
+from swarm_mj.system.fields import as_typed, meaning_of, range_of
 
 ROOT = Path(__file__).parent.parent
 PAGES = {  # where they are on the site, and in the repository
@@ -71,7 +71,7 @@ def mission_fields() -> str:
     """Return the fields of `Mission` as a table."""
     rows = ["| field | default | what it is | allowed | source |", "|---|---|---|---|---|"]
     for spec in fields(Mission):
-        about = about_of(spec)
+        about = meaning_of(spec)
         if about.choices:
             allowed = ", ".join(f"`{choice}`" for choice in about.choices)
         elif about.has_range:

@@ -16,7 +16,7 @@ from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures import style
 from swarm_mj.evaluation.figures.style import look_of
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, is_flock, statistics_of
-from swarm_mj.evaluation.table import missions_of
+from swarm_mj.evaluation.table import missions_title
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 
 Course = Float[np.ndarray, "T"]
@@ -86,7 +86,7 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
     groups: list[list[Result]] = []
     titles: list[list[str]] = []  # in lines
     heights_in: list[float] = []
-    for said, its in groupby(results, missions_of):
+    for said, its in groupby(results, missions_title):
         shown = sorted(its, key=lambda result: result.aoi_mean)
         title = textwrap.wrap(said, CHARACTERS, break_on_hyphens=False)
         groups.append(shown)

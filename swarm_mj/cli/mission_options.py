@@ -15,13 +15,13 @@ from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
 from swarm_mj.simulation.components import GROUP, SHOWN_AS, Components
-from swarm_mj.system.fields import Meaning, about_of, as_typed, kind_of, setting
+from swarm_mj.system.fields import Meaning, as_typed, kind_of, meaning_of, setting
 from swarm_mj.system.user_code import files_named
 
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
 NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
-SPECS = [spec for spec in fields(Mission) if about_of(spec).help]
+SPECS = [spec for spec in fields(Mission) if meaning_of(spec).help]
 FLAGS = {spec.name: flags_of(spec)[0] for spec in SPECS}
 # Missions whose defaults are shown: of flocks, and of other tasks.
 USUAL_FLOCK = paper("flocking")
@@ -74,7 +74,7 @@ class PolicyOptions(Components):
         )
 
 
-def missions_of(
+def missions_given(
     given: Given, called: Callable[[str], str] = FLAGS.__getitem__
 ) -> tuple[Mission, ...]:
     """Return the missions of fields given, as `mission.NAME`; a tuple of values is swept."""
@@ -111,9 +111,9 @@ def _check_number(swept: Mapping[str, Collection[Any]]) -> None:
         )
 
 
-def mission_of(given: Given) -> Mission:
+def mission_given(given: Given) -> Mission:
     """Return the one mission of fields given, as `mission.NAME`."""
-    (mission,) = missions_of(given)
+    (mission,) = missions_given(given)
     return mission
 
 
@@ -122,7 +122,7 @@ def check_in_use(
 ) -> None:
     """Raise ValueError for a field given that counts in no mission: another must switch it on."""
     for spec in fields(Mission):
-        switch = about_of(spec).counts_with
+        switch = meaning_of(spec).counts_with
         if switch is None or spec.name not in given:
             continue
         if not any(switch.is_on(mission) for mission in missions):
@@ -148,7 +148,7 @@ def mission_flags(mission: Mission) -> str:
 
 def about_option(spec: Field[Any]) -> Meaning:
     """Return what the help says of a field of `Mission`: what it says itself, and what is there."""
-    about = about_of(spec)
+    about = meaning_of(spec)
     if spec.name == "arena":  # the mission's room comes before the one that knows the arenas
         return replace(about, help=f"{about.help}: {', '.join(ARENAS)}, or an MJCF file")
     return about
@@ -165,8 +165,8 @@ def mission_options(*, is_many: bool = False) -> Iterator[Option]:
 
 # Fields of a command's dataclass: a mission, and missions whose options take several values, which
 # multiply.
-one_mission = partial(nested, mission_options, mission_of)
-several_missions = partial(nested, partial(mission_options, is_many=True), missions_of)
+one_mission = partial(nested, mission_options, mission_given)
+several_missions = partial(nested, partial(mission_options, is_many=True), missions_given)
 
 
 def _default_of(spec: Field[Any]) -> str:

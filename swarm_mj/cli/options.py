@@ -19,7 +19,7 @@ from swarm_mj.cli.option_values import CONVERT
 from swarm_mj.system import fields as settings
 from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.exit_codes import BAD_INPUT
-from swarm_mj.system.fields import Meaning, about_of
+from swarm_mj.system.fields import Meaning, meaning_of
 from swarm_mj.system.streams import check_printable, in_a_line
 
 Value = TypeVar("Value")
@@ -164,7 +164,7 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
 
 def flags_of(spec: Field[Any]) -> tuple[str, ...]:
     """Return the flag of a field, `--windows` of `num_windows`, then those of earlier releases."""
-    about = about_of(spec)
+    about = meaning_of(spec)
     name = spec.name.removeprefix("num_").removeprefix("is_")
     former = [_flag(each) for each in about.former]
     return (about.flag or _flag(name), *former)
@@ -230,7 +230,7 @@ def _usage(prog: str, options: Iterable[Option]) -> str:
 def _options_of(kind: type[Any]) -> Iterator[Option]:
     """Yield the options of a command's dataclass: its fields, and those nested in them."""
     for spec in fields(kind):
-        about = about_of(spec)
+        about = meaning_of(spec)
         if filled := _nested_in(spec):
             yield from filled.options()
         elif about.help:
@@ -243,7 +243,7 @@ def _nested_in(spec: Field[Any]) -> Nested | None:
 
 def _rare(kind: type[Any], options: Sequence[Option]) -> frozenset[str]:
     """Return the places of options that are not common, if the command says which are."""
-    if not any(about_of(spec).is_common for spec in fields(kind)):
+    if not any(meaning_of(spec).is_common for spec in fields(kind)):
         return frozenset()
     rare: set[str] = set()
     for option in options:

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli.evaluate import StudyFlags, run_study
-from swarm_mj.cli.mission_options import missions_of
+from swarm_mj.cli.mission_options import missions_given
 from swarm_mj.cli.options import Given
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, MAX_REGIMES, Study
 from swarm_mj.mission import Mission
@@ -128,7 +128,7 @@ def _study(tables: dict[str, Any], *, is_trusted: bool) -> Study:
         given = shared | _values(place, table, Mission)
         placed = {f"mission.{field}": value for field, value in given.items()}
         try:
-            regimes += missions_of(placed, called=str)
+            regimes += missions_given(placed, called=str)
         except ValueError as error:
             raise ValueError(f"{place}: {error}") from error
         if len(regimes) > MAX_REGIMES:  # tables may be many, too: stop before all are read

@@ -18,7 +18,7 @@ from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_fea
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.simulation.components import GROUP, Components
-from swarm_mj.system.fields import about_of, as_typed
+from swarm_mj.system.fields import as_typed, meaning_of
 from swarm_mj.system.user_code import is_own
 
 PARTS = {  # the dataclasses of settings and their headings in the help, by their dotted place
@@ -36,7 +36,7 @@ def _specs() -> dict[str, Field[Any]]:
     for part, (owner, _) in PARTS.items():
         for spec in fields(owner):
             is_size = spec.name == "num_robots"  # team sizes are the run's own
-            if about_of(spec).help and not is_size:
+            if meaning_of(spec).help and not is_size:
                 specs[f"{part}{spec.name}"] = spec
     return specs
 
@@ -48,7 +48,7 @@ def setting_options() -> Iterator[Option]:
     """Yield the settings as options, under a heading for each part of the settings."""
     for place, spec in SPECS.items():
         _, heading = PARTS[place.removesuffix(spec.name)]
-        about = about_option(spec) if place.startswith("mission.") else about_of(spec)
+        about = about_option(spec) if place.startswith("mission.") else meaning_of(spec)
         about = replace(about, group=heading, shown=_usual(place))
         yield Option(spec, about, place, is_nested=True)
 
@@ -182,7 +182,7 @@ def _num_groups(missions: int, num_sizes: int) -> int:
 
 def _usual(place: str) -> str:
     """Return the default as text: per robot and, where it differs, per team."""
-    own = about_of(SPECS[place]).shown
+    own = meaning_of(SPECS[place]).shown
     if own is not None:
         return own
     robot = _usual_of("robot", place)

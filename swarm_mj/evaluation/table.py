@@ -55,7 +55,7 @@ def print_results(
     width = max(MIN_WIDTH + max(0, longest - NAME_WIDTH), console.width)
     wide = console_of_width(width=width)
     columns = WIDE if is_wide else BRIEF
-    for regime, group in groupby(results, missions_of):
+    for regime, group in groupby(results, missions_title):
         of_regime = sorted(group, key=lambda result: result.aoi_mean)
         console.print(regime)
         # The wide table just fits, without spaces between its columns.
@@ -66,7 +66,7 @@ def print_results(
     console.print(" ".join(_legend(results, columns)))
 
 
-def missions_of(result: Result) -> str:
+def missions_title(result: Result) -> str:
     """Return the missions that a result is of, in lines: results of others are not compared."""
     parts = {
         "radio": result.radio,

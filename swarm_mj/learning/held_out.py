@@ -85,7 +85,7 @@ def held_out_policy(training: Training, network: AggregationGnn, mission: Missio
     return GnnPolicy(network, extractor, silence_logit=training.silence_logit)
 
 
-def evaluate(
+def held_out_costs(
     training: Training, network: AggregationGnn, on_window: OnWindow = lambda _share: None
 ) -> HeldOutCosts:
     """Fly the held-out missions; return their mean costs."""

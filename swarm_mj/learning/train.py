@@ -228,7 +228,7 @@ class TrainingSession(BaseCallback):
             means = progress.since_evaluation.means()
             begun = progress.minutes
             on_window = partial(self._report, "Evaluating")
-            costs = held_out.evaluate(training, network, on_window)
+            costs = held_out.held_out_costs(training, network, on_window)
         except Stopped:
             return
         self._count_time()

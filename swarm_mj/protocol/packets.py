@@ -128,7 +128,7 @@ def fits(packet: Packet, mission: Mission, taken_s: float = 0.0) -> bool:
     return capacity is None or packet.num_bytes <= capacity
 
 
-def check_fits(
+def check_fits_slot(
     what: str,
     packet: Packet,
     mission: Mission,
@@ -160,7 +160,7 @@ def fitting(packet: Packet, mission: Mission, policy: str, taken_s: float = 0.0)
         return packet
     least = replace(packet, num_entries=1)
     needs = f"packets of {policy} need"
-    check_fits(needs, least, mission, why=" for a single entry", taken_s=taken_s)
+    check_fits_slot(needs, least, mission, why=" for a single entry", taken_s=taken_s)
     spare = BITS_PER_BYTE * (capacity - least.num_bytes)
     return replace(packet, num_entries=1 + spare // _num_bits(packet.entry))
 
@@ -168,7 +168,7 @@ def fitting(packet: Packet, mission: Mission, policy: str, taken_s: float = 0.0)
 def check_whole(what: str, mission: Mission) -> None:
     """Raise ValueError, naming what needs it, unless a slot holds a whole buffer."""
     needs = f"{what} requires unfragmented packets of"
-    check_fits(needs, packet_of(mission), mission, otherwise=", or fewer robots")
+    check_fits_slot(needs, packet_of(mission), mission, otherwise=", or fewer robots")
 
 
 def _num_bits(fields: tuple[PacketField, ...]) -> int:

@@ -130,20 +130,20 @@ def above_zero(switch: object) -> Switch:
     In the body of a class, the name of another field is that field itself, so that no misspelt
     name gets past a type checker, nor past the import. Raises TypeError for what is no `setting`.
     """
-    if not isinstance(switch, Field) or not about_of(switch).has_range:
+    if not isinstance(switch, Field) or not meaning_of(switch).has_range:
         raise TypeError(f"counts_with needs a number that is a `setting`, not {switch!r:.80}")
     return Switch(switch)
 
 
 def set_to(switch: object, state: str) -> Switch:
     """Return that a field counts where another one, as of `above_zero`, is set to a choice."""
-    choices = about_of(switch).choices if isinstance(switch, Field) else ()
+    choices = meaning_of(switch).choices if isinstance(switch, Field) else ()
     if not isinstance(switch, Field) or state not in choices:
         raise TypeError(f"counts_with needs one of {', '.join(choices)}, not {state!r}")
     return Switch(switch, state)
 
 
-def about_of(spec: Field[Any]) -> Meaning:
+def meaning_of(spec: Field[Any]) -> Meaning:
     """Return what a dataclass's field says of itself; nothing, if it is no `setting`."""
     return spec.metadata.get(ABOUT, Meaning())
 
@@ -154,7 +154,7 @@ def same_as(owner: type[Any], name: str, *, is_common: bool | None = None) -> An
     `is_common` says otherwise than the other field whether `--help` always shows it.
     """
     spec = owner.__dataclass_fields__[name]
-    about = about_of(spec)
+    about = meaning_of(spec)
     if is_common is not None:
         about = replace(about, is_common=is_common)
     return field(default=spec.default, metadata={ABOUT: about})
@@ -170,7 +170,7 @@ def former_names(*kinds: type[Any]) -> Mapping[str, str]:
     present: dict[str, str] = {}
     for kind in kinds:
         for spec in fields(kind):
-            for former in about_of(spec).former:
+            for former in meaning_of(spec).former:
                 present[former] = spec.name
     return MappingProxyType(present)
 
@@ -203,7 +203,7 @@ def the_file(path: Path) -> list[Path]:
 def files_read(settings: Any) -> Iterator[Path]:  # noqa: ANN401 - any dataclass
     """Yield the files that a dataclass's fields, and those nested in them, name to be read."""
     for spec in fields(settings):
-        reads = about_of(spec).reads
+        reads = meaning_of(spec).reads
         value = getattr(settings, spec.name)
         for each in value if isinstance(value, tuple) else (value,):
             if is_dataclass(each):
@@ -222,7 +222,7 @@ def kind_of(spec: Field[Any]) -> object:
 
 def range_of(spec: Field[Any]) -> str:
     """Return a field's allowed numbers and their unit, in words."""
-    about = about_of(spec)
+    about = meaning_of(spec)
     ends = f"{as_typed(about.low)} to {as_typed(about.high)}"
     return f"{ends} [{about.unit}]" if about.unit else ends
 
@@ -238,7 +238,7 @@ def as_typed(value: object) -> str:
 
 def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     """Check one value of a field, which may be `called` otherwise where it was given."""
-    about = about_of(spec)
+    about = meaning_of(spec)
     label = called or about.label or spec.name
     kind, described = KINDS.get(kind_of(spec), (object, ""))
     if about.choices:

@@ -16,7 +16,7 @@ from swarm_mj.learning.settings import Training
 from swarm_mj.mission import PRESETS, WORLDS, Mission, paper, reference
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import POLICIES
-from swarm_mj.system.fields import GONE_IN, about_of, former_names
+from swarm_mj.system.fields import GONE_IN, former_names, meaning_of
 
 ROOT = Path(__file__).parents[2]
 
@@ -129,7 +129,7 @@ def test_the_help_shows_every_field_that_has_help(capsys):
     shown = " ".join(capsys.readouterr().out.split())
     for spec in SPECS:
         assert f"{flags_of(spec)[0]} " in shown
-        assert about_of(spec).help in shown
+        assert meaning_of(spec).help in shown
     assert f"what stands in the area: {', '.join(ARENAS)}, or an MJCF file" in shown
 
 

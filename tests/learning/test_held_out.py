@@ -11,7 +11,7 @@ from tiny_policies import tiny_network
 from swarm_mj.learning.held_out import (
     Flights,
     choose,
-    evaluate,
+    held_out_costs,
     held_out_policy,
     notes_of,
     reference_columns,
@@ -36,7 +36,7 @@ def flown(training, size, seed):
 @pytest.mark.parametrize("sizes", [(5,), (3, 6)])
 def test_means_are_those_of_the_missions_flown_one_by_one(sizes):
     training = replace(small_training(sizes=sizes, held_out=3), silence_logit=1.0)
-    found = evaluate(training, NETWORK)
+    found = held_out_costs(training, NETWORK)
     ages, steady, errors, objectives, attempted, delivered = [], [], [], [], 0.0, 0.0
     for size in sizes:
         flights = [flown(training, size, HELD_OUT_SEED + b) for b in range(3)]
@@ -59,7 +59,7 @@ def test_means_are_those_of_the_missions_flown_one_by_one(sizes):
 def test_eq17_flocks_are_judged_by_their_velocity_variance():
     its = {"features": "extended", "network": NETWORK.shape}
     training = small_training("team", "flocking", reward="velocity-variance", **its)
-    found = evaluate(training, NETWORK)
+    found = held_out_costs(training, NETWORK)
     variance = [
         flown(training, 5, HELD_OUT_SEED + b)[0].velocity_variance_mean[0] for b in range(2)
     ]
@@ -73,7 +73,7 @@ def test_global_random_states_do_not_matter_and_are_left_alone():
         torch.manual_seed(seed)
         np.random.seed(seed)  # noqa: NPY002
         before = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
-        results.append(evaluate(training, NETWORK))
+        results.append(held_out_costs(training, NETWORK))
         assert torch.equal(torch.get_rng_state(), before[0])
         after = np.random.get_state()  # noqa: NPY002
         assert all(np.array_equal(a, b) for a, b in zip(after, before[1], strict=True))
@@ -81,7 +81,7 @@ def test_global_random_states_do_not_matter_and_are_left_alone():
 
 
 def test_the_seed_of_the_training_does_not_change_the_missions_and_one_has_no_error():
-    found = [evaluate(small_training(seed=seed, held_out=1), NETWORK) for seed in (1, 2)]
+    found = [held_out_costs(small_training(seed=seed, held_out=1), NETWORK) for seed in (1, 2)]
     assert found[0] == found[1]
     assert found[0].aoi_sem is None
 
@@ -142,7 +142,7 @@ def test_finalists_are_judged_and_the_kept_one_told_on_fresh_missions(monkeypatc
         return fly(flights, policy_of, first_seed, num_missions)
 
     monkeypatch.setattr(Flights, "fly", noted)
-    evaluate(TRAINING, NETWORK)
+    held_out_costs(TRAINING, NETWORK)
     (evaluated,) = seeds
     seeds.clear()
     choose(TRAINING, CURVE, NETWORKS, lambda _share: None)
@@ -212,7 +212,7 @@ def test_the_oracle_flies_few_of_the_held_out_missions_and_no_large_teams(monkey
 
 def test_flights_report_their_shares_and_may_be_broken_off():
     evaluated, chosen = [], []
-    evaluate(small_training(sizes=(3, 6)), NETWORK, evaluated.append)
+    held_out_costs(small_training(sizes=(3, 6)), NETWORK, evaluated.append)
     np.testing.assert_allclose(evaluated, np.arange(1, 41) / 40)
     choice, _ = choose(TRAINING, CURVE, NETWORKS, chosen.append)
     assert chosen == sorted(chosen)

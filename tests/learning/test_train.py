@@ -125,12 +125,12 @@ def test_an_interrupted_run_keeps_its_best_evaluation_and_chooses_later_and_anew
 
 def judge(monkeypatch, objectives):
     """Let evaluations find these objectives, one after the other."""
-    evaluate, objectives = held_out.evaluate, iter(objectives)
+    evaluate, objectives = held_out.held_out_costs, iter(objectives)
 
     def judged(*arguments):
         return replace(evaluate(*arguments), objective=next(objectives))
 
-    monkeypatch.setattr(held_out, "evaluate", judged)
+    monkeypatch.setattr(held_out, "held_out_costs", judged)
 
 
 @pytest.mark.parametrize("sitting", [10, 1000])

@@ -11,19 +11,19 @@ import pytest
 from swarm_mj.mission import Mission, paper, reference
 from swarm_mj.mission import specification as mission_module
 from swarm_mj.mission.labels import CHANNEL
-from swarm_mj.system.fields import about_of, former_names, kind_of
+from swarm_mj.system.fields import former_names, kind_of, meaning_of
 
 # As users load it: without the type checks that these tests run under, which would answer first.
 Unchecked = runpy.run_path(mission_module.__file__)["Mission"]
 
-QUANTITIES = [spec for spec in fields(Mission) if about_of(spec).has_range]
-CHOICES = [spec for spec in fields(Mission) if about_of(spec).choices]
+QUANTITIES = [spec for spec in fields(Mission) if meaning_of(spec).has_range]
+CHOICES = [spec for spec in fields(Mission) if meaning_of(spec).choices]
 SUSPECTS = [0, 1, -1, -(10**12), 10**15, math.nan, math.inf, -math.inf]
 
 
 def beyond(spec):
     """Values outside a field's range: the usual suspects, and those just past each end."""
-    low, high = about_of(spec).low, about_of(spec).high
+    low, high = meaning_of(spec).low, meaning_of(spec).high
     step = 1 if kind_of(spec) is int else 1e-3 * (high - low)
     suspects = [*SUSPECTS, low - step, high + step]
     return [
@@ -71,23 +71,23 @@ NO_OPTIONS = {
 
 
 def test_a_field_is_an_option_unless_it_is_known_to_be_none():
-    assert {spec.name for spec in fields(Mission) if not about_of(spec).help} == NO_OPTIONS
+    assert {spec.name for spec in fields(Mission) if not meaning_of(spec).help} == NO_OPTIONS
 
 
 @pytest.mark.parametrize("spec", fields(Mission), ids=lambda spec: spec.name)
 def test_every_field_names_its_source_and_the_choices_of_its_type(spec):
-    about = about_of(spec)
+    about = meaning_of(spec)
     assert about.source
     if get_origin(spec.type) is Literal:
         assert about.choices == get_args(spec.type)
 
 
-CHANNEL_FIELDS = [spec for spec in fields(Mission) if about_of(spec).group == CHANNEL]
+CHANNEL_FIELDS = [spec for spec in fields(Mission) if meaning_of(spec).group == CHANNEL]
 
 
 @pytest.mark.parametrize("spec", CHANNEL_FIELDS, ids=lambda spec: spec.name)
 def test_every_field_of_the_channel_is_an_option_with_its_choices_or_unit_and_range(spec):
-    about = about_of(spec)
+    about = meaning_of(spec)
     assert about.help
     assert about.choices or (about.unit and about.has_range)
 
@@ -95,7 +95,7 @@ def test_every_field_of_the_channel_is_an_option_with_its_choices_or_unit_and_ra
 def test_what_counts_with_another_field_counts_with_one_that_is_there_and_is_off():
     """That the other one is there is checked as the class is made; so is its choice."""
     names = {spec.name for spec in fields(Mission)}
-    switches = {spec.name: about_of(spec).counts_with for spec in fields(Mission)}
+    switches = {spec.name: meaning_of(spec).counts_with for spec in fields(Mission)}
     on = {name: switch for name, switch in switches.items() if switch}
     assert {switch.name for switch in on.values()} < names
     assert not any(switch.is_on(paper()) for switch in on.values())
@@ -138,7 +138,7 @@ GOES_WITH = {"sensing_dbm": {"noise_dbm": -200.0}}
 
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
 def test_every_quantity_names_its_unit_and_source(spec):
-    about = about_of(spec)
+    about = meaning_of(spec)
     assert about.label
     assert about.unit
     assert about.source
@@ -151,7 +151,7 @@ def test_every_quantity_names_its_unit_and_source(spec):
 @pytest.mark.parametrize("spec", QUANTITIES, ids=lambda spec: spec.name)
 @pytest.mark.parametrize("end", ["low", "high"])
 def test_the_ends_of_a_range_are_allowed(spec, end):
-    value = kind_of(spec)(getattr(about_of(spec), end))
+    value = kind_of(spec)(getattr(meaning_of(spec), end))
     given = GOES_WITH.get(spec.name, {}) | {spec.name: value}
     assert getattr(Mission(**given), spec.name) == value
 
@@ -186,11 +186,11 @@ def test_minislots_leave_some_of_a_slot():
     ("spec", "value"), REFUSED, ids=[f"{spec.name}={value:g}" for spec, value in REFUSED]
 )
 def test_values_outside_their_range_are_refused(spec, value):
-    with pytest.raises(ValueError, match=about_of(spec).label) as refusal:
+    with pytest.raises(ValueError, match=meaning_of(spec).label) as refusal:
         Unchecked(**{spec.name: value})
     message = str(refusal.value)
     allowed, given = message.rsplit("not", 1)
-    about = about_of(spec)
+    about = meaning_of(spec)
     assert f"from {about.low:g} to {about.high:g}" in allowed
     assert about.unit in allowed
     assert float(given) == pytest.approx(value, rel=1e-5, nan_ok=True)
@@ -217,10 +217,10 @@ def test_numpy_s_numbers_are_numbers():
 
 @pytest.mark.parametrize("spec", CHOICES, ids=lambda spec: spec.name)
 def test_unknown_choices_are_refused(spec):
-    with pytest.raises(ValueError, match=about_of(spec).label) as refusal:
+    with pytest.raises(ValueError, match=meaning_of(spec).label) as refusal:
         Unchecked(**{spec.name: "telepathy"})
     assert "'telepathy'" in str(refusal.value)
-    for choice in about_of(spec).choices:
+    for choice in meaning_of(spec).choices:
         assert choice in str(refusal.value)
         assert getattr(Unchecked(**{spec.name: choice}), spec.name) == choice
 

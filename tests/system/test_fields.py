@@ -11,11 +11,11 @@ from swarm_mj.system.arguments import check_names
 from swarm_mj.system.fields import (
     Meaning,
     MeaningFields,
-    about_of,
     above_zero,
     check,
     former_names,
     kind_of,
+    meaning_of,
     same_as,
     set_to,
     setting,
@@ -89,7 +89,7 @@ class Oven:
 
 
 def test_a_field_says_with_which_other_one_it_counts():
-    switches = {spec.name: about_of(spec).counts_with for spec in fields(Oven)}
+    switches = {spec.name: meaning_of(spec).counts_with for spec in fields(Oven)}
     assert {name: each.name for name, each in switches.items() if each} == {
         "fan_rpm": "heat",
         "steam_s": "steam",

@@ -12,10 +12,10 @@ from typing import Annotated, ClassVar
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from swarm_mj.policies.gnn.extended_features import ADDRESS_RANGES, CROWD, FAR_RANGES, TEAM
 from swarm_mj.policies.gnn.features import Feature, dtype_of, names_of
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import log_age
+from swarm_mj.policies.gnn.scales import ADDRESS_RANGES, CROWD, FAR_RANGES, TEAM
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 

@@ -20,7 +20,7 @@ from swarm_mj.policies.planner.resting import PLANNER_LOOK, PLANS_MEMORY, Restin
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import snapshot_fields
 from swarm_mj.policies.policy import BroadcastPolicy, team_views
-from swarm_mj.protocol.packets import PacketField, check_fits, fits, packet_of
+from swarm_mj.protocol.packets import PacketField, check_fits_slot, fits, packet_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 
@@ -77,7 +77,7 @@ class Planner(BroadcastPolicy):
         """
         packet = packet_of(mission, snapshot_fields(mission))
         otherwise = ", or planner --payload none"
-        check_fits("packets of planner need", packet, mission, otherwise=otherwise)
+        check_fits_slot("packets of planner need", packet, mission, otherwise=otherwise)
         self._mission = mission
         self._settings = settings or PlannerSettings()
         self._belief = Belief(radio=radio_of(mission))
