@@ -122,7 +122,7 @@ def read_run(folder: Path, named: Collection[str] | None = ()) -> TrainingRun:
 
 
 class CurvePoint(NamedTuple):
-    """What is drawn of an evaluation; a file need have no more than the first two columns."""
+    """A point of the curve that is drawn; a file need have no more than the first two columns."""
 
     decisions: float
     aoi: float  # [windows]

@@ -37,7 +37,7 @@ Columns = dict[str, float]  # numbers by the names of the learning curve's colum
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOutCosts:
-    """What the held-out missions cost a policy: means in which team sizes count alike."""
+    """Costs of a policy on the held-out missions: means in which team sizes count alike."""
 
     aoi: float  # age of information [windows]
     aoi_sem: float | None = None  # its standard error over the missions; None of one mission

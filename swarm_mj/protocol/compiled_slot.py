@@ -1,4 +1,4 @@
-"""What happens in a slot, compiled, for the paper's radio and packets of whole buffers.
+"""The steps of a slot, compiled, for the paper's radio and packets of whole buffers.
 
 `compiled_window` puts these together. Three kinds of positions meet here: where a robot truly is,
 which the radio goes by; where it observes itself to be; and where others believe it to be. Named

@@ -32,7 +32,7 @@ SomeCount = TypeVar("SomeCount")  # likewise
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class FlownCosts(Generic[Mean, Count, SomeMean, SomeCount]):
-    """What the windows flown cost, of one mission or of several side by side.
+    """Costs of the windows flown, of one mission or of several side by side.
 
     Packets are totals. Those of policies that address are delivered or lost, broadcasts are heard
     or not; counts of the other kind are not defined.
