@@ -17,7 +17,7 @@ from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission, PresetAndFields
 from swarm_mj.policies.registry import listed
 from swarm_mj.simulation.components import Components
-from swarm_mj.simulation.memory import policy_memory
+from swarm_mj.simulation.memory import memory_growth, policy_memory
 from swarm_mj.system.fields import check_value
 from swarm_mj.system.needs import Needs, check_fits, memory_errors
 from swarm_mj.system.packages import need
@@ -240,12 +240,15 @@ def evaluate(
 def study_needs(study: Study, num_jobs: int) -> Needs:
     """Return the memory and disk of a study: a batch in each process, and the results of all."""
     batches = study.batches
-    largest = max(policy_memory(x.policy, x.mission, len(x.seeds)) for x in batches)
+    memory = [policy_memory(each.policy, each.mission, len(each.seeds)) for each in batches]
+    largest = max(memory)
+    hungriest = batches[memory.index(largest)]
     ages = sum(2 * batch.mission.num_windows + 1 for batch in batches)  # counts
     under_way = min(num_jobs, len(batches)) * largest
     return Needs(
         memory=under_way + AGE_COUNT * ages + RESULT * study.num_missions,
         file=AGE_COUNT_IN_FILE * ages + RESULT_IN_FILE * study.num_missions,
+        grows=memory_growth(hungriest.policy, hungriest.mission),
     )
 
 
