@@ -24,7 +24,7 @@ from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.replay.recorder import Recorder, check_observer
 from swarm_mj.replay.replay_size import IN_MEMORY, ON_DISK
 from swarm_mj.simulation.components import Components
-from swarm_mj.simulation.memory import FLYING, LIBRARIES, policy_memory
+from swarm_mj.simulation.memory import FLYING, LIBRARIES, memory_growth, policy_memory
 from swarm_mj.simulation.rollout import WindowRecord, rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiling
@@ -181,10 +181,12 @@ def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | N
 def flight_needs(mission: Mission, policy: str, *, is_recorded: bool) -> Needs:
     """Return the memory and disk that a flight takes."""
     memory = policy_memory(policy, mission) + (FLYING - LIBRARIES)
+    grows = memory_growth(policy, mission)
     if not is_recorded:
-        return Needs(memory=memory)
+        return Needs(memory=memory, grows=grows)
     num = mission.num_windows
-    return Needs(memory=memory + IN_MEMORY.of(mission, num), file=ON_DISK.of(mission, num))
+    memory += IN_MEMORY.of(mission, num)
+    return Needs(memory=memory, file=ON_DISK.of(mission, num), grows=grows)
 
 
 def compile_ahead(mission: Mission, policy_name: str, arguments: PolicyArguments = USUAL) -> None:

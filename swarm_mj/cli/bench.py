@@ -24,7 +24,8 @@ WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
 BUSY = 0.3  # the spread from which on numbers say little
 LEGEND = """
 window: 100 ms of a mission. The indented rows below the line are its parts.
-plain MuJoCo step: mj_step of the same scene, without radio: the yardstick.
+plain MuJoCo step: mj_step of the same scene, without radio: the yardstick, timed in turn with ours.
+times: of one thread on a processor; of several threads, and of evaluations, on the wall.
 arena blocks: costs most in MuJoCo, which looks for contacts in each of its ten steps a window.
 time to decide: processor time of one thread, which decides for all robots, in the mean of the first
 120 windows of a mission. The planner's includes its plans, once in half as many windows as there

@@ -7,7 +7,7 @@ from functools import partial
 import numpy as np
 import torch
 
-from swarm_mj.cli.bench_simulation import Row, microseconds
+from swarm_mj.cli.bench_simulation import Clock, Row, clock_of, in_turn_us, microseconds
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.settings import usual_settings
@@ -26,9 +26,10 @@ SHAPE = GnnShape(num_features=len(PaperFeatures.names))  # the paper's
 def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.0) -> Iterator[Row]:
     """Time networks and training, in team decisions per second; no weights are kept."""
     torch.set_num_threads(threads)
+    clock = clock_of(threads)
     mission = paper("stationary", num_robots=num_robots)
     for num_missions in (1, 32):
-        yield from _network_rows(mission, num_missions, seconds)
+        yield from _network_rows(mission, num_missions, seconds, clock)
     ratio = _environment_windows(mission, 32, seconds)
     yield Row("a step of make_vec, 32 missions, default features, in windows", ratio, "{:.2f}")
     for credit in ("robot", "team"):
@@ -39,7 +40,7 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
     for name, (shape, features) in own.items():
         node, parent = _graphs(mission, features, 1)
         decide = _forward(FastAggregationGnn(shape), node[:1], parent[:1])
-        decision_us = microseconds(decide, seconds / 2)
+        decision_us = microseconds(decide, seconds / 2, clock)
         yield Row(f"one robot's decision, network of {name}", decision_us, "{:.0f} µs")
 
 
@@ -49,17 +50,20 @@ def _environment_windows(mission: Mission, num_missions: int, seconds: float) ->
     env = SwarmVectorEnv(num_missions, mission)
     swarm.start(RoundRobin())
     env.reset(seed=list(range(num_missions)))
-    window_us = microseconds(swarm.step, seconds / 2)
-    both_us = microseconds(lambda: (swarm.step(), env.step(swarm.phases[0].recipient)), seconds)
+    window_us, both_us = in_turn_us(
+        (swarm.step, lambda: (swarm.step(), env.step(swarm.phases[0].recipient))), 1.5 * seconds
+    )
     return both_us / window_us - 1.0
 
 
-def _network_rows(mission: Mission, num_missions: int, seconds: float) -> Iterator[Row]:
+def _network_rows(
+    mission: Mission, num_missions: int, seconds: float, clock: Clock
+) -> Iterator[Row]:
     """Time the paper's network (K = 5, width 64) on the CPU."""
     network = FastAggregationGnn(SHAPE)
     node, parent = _graphs(mission, "paper", num_missions)
-    forward_us = microseconds(_forward(network, node, parent), seconds)
-    backward_us = microseconds(lambda: network(node, parent).sum().backward(), seconds)
+    forward_us = microseconds(_forward(network, node, parent), seconds, clock)
+    backward_us = microseconds(lambda: network(node, parent).sum().backward(), seconds, clock)
     whose = f"the paper's network, {num_missions} mission{'s' if num_missions > 1 else ''}"
     yield Row(f"{whose}: team decisions", 1e6 * num_missions / forward_us, "{:.0f} / s")
     yield Row("  with gradients, as in training", 1e6 * num_missions / backward_us, "{:.0f} / s")
@@ -79,7 +83,8 @@ def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float)
     missions = settings.missions // share
     fewer = replace(settings, threads=threads, missions=missions, groups=1, ppo=ppo)
     learn = partial(make_model(fewer).learn, 1, reset_num_timesteps=False, log_interval=10**9)
-    return 1e6 * ppo.num_steps * missions / microseconds(learn, seconds)
+    learn_us = microseconds(learn, seconds, clock_of(threads))
+    return 1e6 * ppo.num_steps * missions / learn_us
 
 
 def _graphs(mission: Mission, features: str, number: int) -> tuple[torch.Tensor, torch.Tensor]:

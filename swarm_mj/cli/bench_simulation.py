@@ -1,6 +1,8 @@
 """How fast the simulation is: windows per second, whole and in parts, and what evaluations take.
 
-The yardstick is a plain mj_step in the same run. A measurement takes about `seconds`.
+The yardstick is a plain mj_step, timed in turn with what it is compared with. Times are those of
+this thread on a processor, so that pauses for other programs do not count; only where several
+threads work, and for evaluations, it is the time on the wall. A measurement takes about `seconds`.
 """
 
 import json
@@ -9,7 +11,7 @@ import time
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
-from timeit import repeat, timeit
+from timeit import timeit
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -46,6 +48,9 @@ LONGEST_S = 1800.0  # of a team's process
 MB = 1e6
 
 
+Clock = Callable[[], float]  # [s]
+
+
 class Row(NamedTuple):
     """A line of a table."""
 
@@ -77,14 +82,15 @@ def simulation_rows(num_missions: int, num_threads: int, seconds: float) -> Iter
         "the radio alone": lambda: channel(swarm.states.position_m, recipient),
         "hops of news are counted (fly only)": lambda: mean_hops(swarm.buffers),
     }
-    window_us = microseconds(lambda: swarm.step(policy), seconds) / num_missions
-    step_us = plain_step_us(seconds / 4)
+    clock = clock_of(num_threads)
+    many_us, step_us = in_turn_us((lambda: swarm.step(policy), plain_step()), seconds, clock)
+    window_us = many_us / num_missions
     yield Row("windows simulated per second", 1e6 / window_us, "{:,.0f}")
     yield Row("time of one window of one mission", window_us)
     yield Row(IN_STEPS, window_us / step_us, "{:.2f}")
     yield Row(PLAIN_STEP, step_us, ends_section=True)
     for name, part in parts.items():
-        yield Row(name, microseconds(part, seconds / 4) / num_missions)
+        yield Row(name, microseconds(part, seconds / 4, clock) / num_missions)
 
 
 def world_rows(num_missions: int, seconds: float) -> Iterator[Row]:
@@ -164,9 +170,9 @@ def measure(num_robots: int, seconds: float) -> None:
     compile_ahead(mission, TEAMS_FLY)
     policy = make_policy(TEAMS_FLY, mission)
     before = peak_memory()
-    begun_s = time.perf_counter()
+    begun_s = time.thread_time()
     swarm = Swarm(mission, [0])
-    start_s = time.perf_counter() - begun_s
+    start_s = time.thread_time() - begun_s
     window_us = microseconds(lambda: swarm.step(policy), seconds)
     peak = peak_memory()
     # A tiny team may fit in what the process has used already, so that the peak does not move. It
@@ -242,15 +248,42 @@ def talking(swarm: Swarm, recipient: Int[np.ndarray, "B N"]) -> Callable[[], obj
     return talk
 
 
-def plain_step_us(seconds: float) -> float:
-    """Time one mj_step of the scene of 40 robots [µs]."""
+def plain_step() -> Callable[[], None]:
+    """Return an mj_step of the scene of 40 robots."""
     model = compose(MISSION).compile()
     data = MjData(model)
-    return microseconds(lambda: mj_step(model, data), seconds)
+    return lambda: mj_step(model, data)
 
 
-def microseconds(call: Callable[[], object], seconds: float) -> float:
+def plain_step_us(seconds: float) -> float:
+    """Time a plain step [µs]."""
+    return microseconds(plain_step(), seconds)
+
+
+def clock_of(num_threads: int) -> Clock:
+    """Return the clock of work on this many threads: of several, only the wall's counts all."""
+    return time.thread_time if num_threads == 1 else time.perf_counter
+
+
+def microseconds(
+    call: Callable[[], object], seconds: float, clock: Clock = time.thread_time
+) -> float:
     """Return the median time of a call, after one that is not timed [µs]."""
-    call()
-    num_calls = max(1, int(seconds / REPETITIONS / max(timeit(call, number=1), 1e-7)))
-    return 1e6 * float(np.median(repeat(call, number=num_calls, repeat=REPETITIONS))) / num_calls
+    (call_us,) = in_turn_us((call,), seconds, clock)
+    return call_us
+
+
+def in_turn_us(
+    calls: Sequence[Callable[[], object]], seconds: float, clock: Clock = time.thread_time
+) -> list[float]:
+    """Return the median times of calls that are timed in turn, so that load affects all [µs]."""
+    numbers = []
+    for call in calls:
+        call()
+        once_s = max(timeit(call, number=1, timer=clock), 1e-7)
+        numbers.append(max(1, int(seconds / REPETITIONS / len(calls) / once_s)))
+    times_us: list[list[float]] = [[] for _ in calls]
+    for _ in range(REPETITIONS):
+        for call, number, its_us in zip(calls, numbers, times_us, strict=True):
+            its_us.append(1e6 * timeit(call, number=number, timer=clock) / number)
+    return [float(np.median(its_us)) for its_us in times_us]

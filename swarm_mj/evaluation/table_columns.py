@@ -67,6 +67,10 @@ def _difference_in_a_line(result: Result) -> str:
     return f"{mean} [{ends}]" if ends else mean
 
 
+def _complete(result: Result) -> str:
+    return f"{result.complete_share:.0%}"
+
+
 def _task_cost(result: Result) -> str:
     return plus_minus(result.task_cost_mean, result.task_cost_sem)
 
@@ -114,12 +118,24 @@ AGE_MEANING = (
     f"AoI: {AOI.title}, how old a robot's news of another is [{AOI.unit}]; mean over the missions,"
 )
 
+COMPLETE_MEANING = "All: missions that ended with everyone having heard of everyone."
+
 # What most people read, in one line.
 BRIEF = (
     Shown(
         heading="AoI ± SEM",
         cell=lambda result: plus_minus(result.aoi_mean, result.aoi_sem),
         meaning=f"{AGE_MEANING} with its standard error.",
+    ),
+    Shown(
+        heading="median, p95",
+        cell=lambda result: f"{result.aoi_median:.1f}, {result.aoi_p95:.1f}",
+        meaning="Median and 95th percentile (p95) are over missions: means hide their tail.",
+    ),
+    Shown(
+        heading="all",
+        cell=_complete,
+        meaning=COMPLETE_MEANING,
     ),
     Shown(
         heading=lambda result: f"minus {result.baseline}'s [95 %]",
@@ -155,6 +171,11 @@ WIDE = (
         heading="median\np95",
         cell=lambda result: f"{result.aoi_median:.2f}\n{result.aoi_p95:.2f}",
         meaning="Median and p95 are over missions.",
+    ),
+    Shown(
+        heading="all",
+        cell=_complete,
+        meaning=COMPLETE_MEANING,
     ),
     Shown(
         heading="difference\n95 %",

@@ -17,6 +17,8 @@ ROBOT = 8.5e3  # in MuJoCo's model, however many missions there are [bytes]
 PAIR = 57.0  # the tables of robots, costs and the radio
 LEARNED_PAIR = 450.0  # these, and the network's input
 HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
+# Where these entries are most of it, a message says so: nobody expects a table of N^3.
+REMEMBERING = 120
 
 
 def policy_memory(policy: str, mission: Mission, num_missions: int = 1) -> float:
@@ -47,3 +49,11 @@ def learned_memory(num_robots: int, num_missions: int) -> float:
     """Return the memory of missions of N robots that a network flies, with its input [bytes]."""
     pairs = num_missions * num_robots**2
     return LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * num_robots) * pairs
+
+
+def memory_growth(policy: str, mission: Mission) -> str:
+    """Return what to say of a policy's memory where it grows with the cube of the team, or ""."""
+    num = mission.num_robots
+    if not is_learned(policy) or num < REMEMBERING:
+        return ""
+    return f"{policy} remembers {num:,} numbers for each of {num:,} x {num:,} pairs of robots"

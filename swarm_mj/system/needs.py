@@ -39,6 +39,7 @@ class Needs:
 
     memory: float
     file: float = 0.0  # all that it writes
+    grows: str = ""  # a sentence on what takes the memory, where it grows faster than expected
 
 
 def check_fits(
@@ -61,6 +62,8 @@ def check_fits(
     for what, needed, free, where in has:
         if needed > free and not is_forced:
             lack = f"this takes about {in_gb(needed)} {what}, and {in_gb(free)} {where}"
+            if needs.grows and what.startswith(("of memory", "of address")):
+                lack = f"{lack}; {needs.grows}"
             raise ValueError(f"{lack}; {way_out}{way_on}")
 
 

@@ -1,5 +1,7 @@
 """The benchmark measures what it says; how fast is no test's business."""
 
+import time
+
 import numpy as np
 import pytest
 
@@ -7,8 +9,11 @@ from swarm_mj.cli.bench_simulation import (
     IN_STEPS,
     PLAIN_STEP,
     Row,
+    clock_of,
     evaluation_rows,
     growth,
+    in_turn_us,
+    microseconds,
     simulation_rows,
     talking,
     team_rows,
@@ -28,6 +33,24 @@ def test_a_timing_is_consistent():
     assert rows["windows simulated per second"] == pytest.approx(1e6 / window_us)
     assert rows[IN_STEPS] == pytest.approx(window_us / rows[PLAIN_STEP])
     assert rows["the radio alone"] < window_us
+
+
+def test_what_is_compared_is_timed_in_turn_after_a_call_that_is_not_timed():
+    called = []
+    times_us = in_turn_us((lambda: called.append("a"), lambda: called.append("b")), 1e-9)
+    assert len(times_us) == 2
+    assert called == ["a", "a", "b", "b", *["a", "b"] * 7]  # how long each takes comes first
+
+
+def test_pauses_for_other_programs_do_not_count_unless_threads_share_the_work():
+    """A sleep of 20 ms is a pause: it takes this thread no time on a processor."""
+
+    def rest():
+        time.sleep(0.02)
+
+    assert microseconds(rest, 1e-9) < 5_000.0
+    assert microseconds(rest, 1e-9, clock_of(2)) > 20_000.0
+    assert clock_of(1) is time.thread_time
 
 
 def test_worlds_are_timed_against_free_space_in_the_same_physics():

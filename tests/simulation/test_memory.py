@@ -11,6 +11,7 @@ from swarm_mj.simulation.memory import (
     ROBOT,
     TORCH,
     learned_memory,
+    memory_growth,
     policy_memory,
 )
 
@@ -35,6 +36,15 @@ def test_tables_grow_with_pairs_and_missions_and_by_what_the_policy_says(policy,
 def test_a_network_takes_its_input_and_the_packets_that_it_remembers():
     expected = LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * 10) * 3 * 10**2
     assert policy_memory("gnn", MISSION, 3) == learned_memory(10, 3) == pytest.approx(expected)
+
+
+def test_that_memory_grows_with_the_cube_of_the_team_is_said_where_it_is_most_of_it():
+    """Of 200 robots 4 N bytes a pair are 800, of 450 for all else; of 40 they are 160."""
+    large = paper("stationary", num_robots=1000)
+    says = "gnn remembers 1,000 numbers for each of 1,000 x 1,000 pairs of robots"
+    assert memory_growth("gnn", large) == says
+    assert memory_growth("gnn", MISSION) == ""
+    assert memory_growth("planner", large) == ""
 
 
 def test_a_policy_of_ones_own_that_cannot_be_imported_is_refused():

@@ -52,7 +52,10 @@ def test_what_fits_passes(machine, tmp_path):
 def test_a_refusal_names_need_limit_and_way_out(machine, tmp_path):
     line = refusal(Needs(memory=53.2e9))
     assert line.startswith("this takes about 53.2 GB of memory, and 8 GB are free; fly less")
-    line = refusal(Needs(memory=1e9, file=12e9), tmp_path)
+    line = refusal(Needs(memory=53.2e9, grows="gnn remembers much"))
+    assert "8 GB are free; gnn remembers much; fly less" in line
+    line = refusal(Needs(memory=1e9, file=12e9, grows="gnn remembers much"), tmp_path)
+    assert "gnn" not in line
     assert f"about 12 GB on disk, and 2 GB fit at {tmp_path}; fly less" in line
     machine(most=1e9)
     check_fits(Needs(memory=1e9, file=1e9), tmp_path, "", is_forced=False)
