@@ -221,3 +221,35 @@ def test_the_core_does_not_load_heavy_libraries(core, heavy):
     code = f"import sys, {core}; print(*({heavy} & sys.modules.keys()))"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.split() == []
+
+
+# Modules without a test file of their own, and where their tests stand.
+ELSEWHERE = {
+    "__main__": "system/test_without_posix.py",
+    "mission/conventions": "mission/test_specification.py",
+    "mission/dynamics": "mission/test_specification.py",
+    "mission/faults": "mission/test_specification.py",
+    "mission/labels": "mission/test_specification.py",
+    "mission/surroundings": "mission/test_specification.py",
+    "mission/transceiver": "mission/test_specification.py",
+    "physics/arena_files": "physics/test_arenas.py",
+    "policies/gnn/scales": "policies/gnn/test_extended_features.py",
+    "policies/planner/resting_team": "policies/planner/test_resting.py",
+    "protocol/compiled_slot": "protocol/test_compiled_window.py",
+    "protocol/window_protocols": "protocol/test_window.py",
+    "radio/effect": "radio/test_effects.py",
+    "replay/layer_kinds": "replay/test_layers.py",
+}
+
+
+def test_tests_mirror_the_package():
+    """A module's tests are found by its name, or in `ELSEWHERE`."""
+    tests = Path(__file__).parent
+    lacking = set()
+    for path in PACKAGE.rglob("*.py"):
+        module = path.relative_to(PACKAGE).with_suffix("")
+        mirror = tests / module.parent / f"test_{module.name}.py"
+        if module.name != "__init__" and not mirror.exists():
+            lacking.add(module.as_posix())
+    assert lacking == set(ELSEWHERE)
+    assert all((tests / place).is_file() for place in ELSEWHERE.values())

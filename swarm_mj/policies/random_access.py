@@ -102,9 +102,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
 
     def _drawn(self, views: LocalViews) -> Int[np.ndarray, "B N"]:
         """Return an addressee for each robot that draws a transmission, else the robot itself."""
-        draws = self._stream.next()  # [B 2 N]
-        chance = draws[:, 0]
-        choice = draws[:, 1]
+        chance, choice = self._stream.next().swapaxes(0, 1)  # of [B 2 N]
         anyone = (choice * views.num_robots).astype(np.int64)
         return np.where(chance < self._probability, anyone, views.silence)
 

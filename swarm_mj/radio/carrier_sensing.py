@@ -91,9 +91,9 @@ class CarrierSensing:
         if states.is_active is not None:
             contends &= states.is_active
         if self._errors is not None:
-            error = self._errors.next()  # [B 2 N]
-            busy_mw = np.where(error[:, 0] < self._miss, np.inf, busy_mw)
-            contends &= ~(listens & (error[:, 1] < self._false_alarm))
+            missing, alarming = self._errors.next().swapaxes(0, 1)  # of [B 2 N]
+            busy_mw = np.where(missing < self._miss, np.inf, busy_mw)
+            contends &= ~(listens & (alarming < self._false_alarm))
         begins = np.zeros(contends.shape, dtype=np.bool_)
         for b in np.flatnonzero(np.any(contends, axis=1)).tolist():
             power_mw = self._truth.mean_powers_mw(states.position_m[b], b)
