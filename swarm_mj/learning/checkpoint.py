@@ -21,7 +21,7 @@ from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import policy_of
-from swarm_mj.learning.selection import Progress, candidates, curve_row_of
+from swarm_mj.learning.selection import Columns, Progress, candidates, curve_row_of
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.feature_sets import check_unchanged, known_names
 from swarm_mj.policies.gnn.network import AggregationGnn
@@ -112,7 +112,8 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     """
     stored = state["progress"]
     progress = read_plain(stored | {"curve": []}, Progress)
-    progress.curve = [curve_row_of(row) for row in stored["curve"]]
+    rows = read_plain(stored["curve"], list[Columns])
+    progress.curve = [curve_row_of(row) for row in rows]
     env = env_of(model)
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
     networks = Networks()

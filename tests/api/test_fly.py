@@ -52,15 +52,14 @@ def deaf(position_m, recipient):
             {"task": "stationary", "policy": "aloha", "probability": 0.2, "preset": "reference"},
             ("--policy", "aloha", "--probability", "0.2", "--preset", "reference"),
         ),
-        ({"failure_fraction": 0.3, "record": False, "observer": 2}, ("--failure-fraction", "0.3")),
+        ({"failure_fraction": 0.3, "record": False}, ("--failure-fraction", "0.3")),
     ],
 )
 def test_it_is_what_the_command_line_flies(here, keywords, options):
     (here / "own_fly_parts.py").write_text(OWN)
     run = swarm_mj.fly(**(SHORT | keywords))
     task = keywords.get("task", "flocking")
-    observer = str(keywords.get("observer", 0))
-    line = ["fly", "--task", task, *OPTIONS, *options, "--observer", observer]
+    line = ["fly", "--task", task, *OPTIONS, *options]
     assert main([*line, "--no-record", "--json", "told.json"]) == 0
     told = json.loads((here / "told.json").read_text())
     run.save("ours.json")

@@ -340,7 +340,8 @@ def test_what_a_policy_of_ones_own_does_wrong_is_said_in_one_line(here, capsys, 
 
 
 @pytest.mark.usefixtures("here")
-def test_an_observer_must_be_a_robot_also_without_a_replay(capsys):
-    flown = ["fly", "--policy", "tdma", "--no-record", "--robots", "3", "--windows", "3"]
+def test_an_observer_must_be_a_robot(here, capsys):
+    flown = ["fly", "--policy", "tdma", "--record", "a.rrd", "--robots", "3", "--windows", "3"]
     assert main([*flown, "--observer", "7"]) == 2
     assert "observer must be from 0 to 2, not 7" in capsys.readouterr().err
+    assert not (here / "a.rrd").exists()

@@ -37,7 +37,7 @@ OPTIONAL = [spec.name for spec in fields(Result) if NoneType in get_args(spec.ty
 def test_a_csv_comes_back_bit_for_bit(tmp_path):
     results = [
         some_result(),
-        some_result(policy="a, b\n'c'", aoi_mean=0.1 + 0.2, age_worst=1e-300),
+        some_result(policy="a, b 'c' \"d\"", aoi_mean=0.1 + 0.2, age_worst=1e-300),
         some_result(**dict.fromkeys(OPTIONAL)),
     ]
     write_results(tmp_path / "new" / "r.csv", results)
