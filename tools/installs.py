@@ -133,7 +133,7 @@ def shown_lines() -> set[str]:
 def commands(install: Install, python: Path, wheel: Path) -> Iterator[list[str]]:
     """Yield what installs the lines into the environment of `python`, with this wheel as ours."""
     into = [str(UV), "pip", "install", "--quiet", "--python", str(python)]
-    ours = {"swarm_mj": str(wheel), ".": str(wheel), f"{wheel.name}": str(wheel)}
+    ours = {"swarm_mj": str(wheel), ".": str(wheel), wheel.name: str(wheel)}
     if install.is_on_top:
         yield [*into, str(wheel)]
     for line in install.lines:
