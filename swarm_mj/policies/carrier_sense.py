@@ -204,7 +204,10 @@ class AgeGainCsma(SensingPolicy):
 
 
 def _in_turn(views: LocalViews, turn: int) -> Contention:
-    """Return that the owners of a turn, whose identities leave one rest, transmit unheeding."""
+    """Return the contention of a turn: its owners do not listen, and all others are silent.
+
+    A robot owns a turn if its identity and the turn's number are equal modulo `NUM_TURNS`.
+    """
     num_turns = min(views.num_robots, NUM_TURNS)
     is_owner = views.silence % num_turns == turn % num_turns
     minislot = np.where(is_owner, 0.0, np.inf)

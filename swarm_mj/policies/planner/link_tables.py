@@ -181,7 +181,7 @@ def _curves(law: int) -> Curves:
 
 @cache
 def _log_probabilities() -> tuple[Float[np.ndarray, "K F X"], Float[np.ndarray, "K F X"]]:
-    """Return those of a packet that is decoded, and missed: by bin, law and excess."""
+    """Return the log-probabilities that a packet is decoded, and missed: by bin, law, excess."""
     margin_db = BIN_CENTRES_DB[:, None] + EXCESS_DB[None, :]
     # A link's margin lies somewhere in its bin, always at the same place. So for either outcome it
     # is taken to be where that is most probable; else what is certain would look like luck.

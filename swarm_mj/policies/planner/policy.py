@@ -83,7 +83,7 @@ class Planner(BroadcastPolicy):
         self._belief = Belief(radio=radio_of(mission))
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
-        """Return those of the snapshots; arguments as in `Policy.payload_fields`."""
+        """Return the fields of the snapshots; arguments as in `Policy.payload_fields`."""
         return snapshot_fields(mission)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:

@@ -129,7 +129,7 @@ class RestingPlanner(BroadcastPolicy):
             self.payload = WITH_LINKS.payload_name
 
     def payload_fields(self, mission: Mission) -> tuple[PacketField, ...]:
-        """Return those of observed links; arguments as in `Policy.payload_fields`."""
+        """Return the fields of observed links; arguments as in `Policy.payload_fields`."""
         return link_tables.link_fields(mission) if self._learns else ()
 
     def inform(self, belief: Belief) -> None:
