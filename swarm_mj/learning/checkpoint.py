@@ -10,7 +10,7 @@ import json
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -32,6 +32,13 @@ CHECKPOINT_VERSION = 5  # that of 1.0.0
 MOMENTS = ("mean", "var", "count")  # of `VecNormalize`'s returns
 
 Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
+
+
+@dataclass(frozen=True)
+class _Curve:
+    """The rows of a learning curve, as they are stored."""
+
+    rows: list[Columns]
 
 
 def save(
@@ -112,8 +119,8 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     """
     stored = state["progress"]
     progress = read_plain(stored | {"curve": []}, Progress)
-    rows = read_plain(stored["curve"], list[Columns])
-    progress.curve = [curve_row_of(row) for row in rows]
+    curve = read_plain({"rows": stored["curve"]}, _Curve)
+    progress.curve = [curve_row_of(row) for row in curve.rows]
     env = env_of(model)
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
     networks = Networks()
