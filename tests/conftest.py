@@ -12,6 +12,19 @@ from sampled_types import check_again
 settings.register_profile("all", deadline=None, max_examples=50)
 settings.register_profile("fast", deadline=None, max_examples=20)
 
+# What most commands load besides, seconds each. Tests of what a command loads have other processes.
+LIBRARIES = (
+    "pandas",  # of rerun
+    "rerun.blueprint",
+    "scipy.stats",
+    "swarm_mj.api.charts",
+    "swarm_mj.api.evaluate",
+    "swarm_mj.api.fly",
+    "swarm_mj.learning.train",
+    "swarm_mj.replay.write",
+    "torch._dynamo",  # of torch's optimisers
+    "torch.utils.tensorboard",
+)
 TRAINING = Path(__file__).parent.parent / "training"
 
 
@@ -53,8 +66,8 @@ def pytest_runtest_setup():
 
 @pytest.fixture(scope="session")
 def forks(tmp_path_factory):
-    """Runs programs, each as a process of its own."""
-    programs = Forks(tmp_path_factory.mktemp("said"))
+    """Runs programs, each as a process of its own; all share what takes long to load."""
+    programs = Forks(tmp_path_factory.mktemp("said"), LIBRARIES)
     yield programs
     programs.close()
 

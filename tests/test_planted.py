@@ -312,6 +312,7 @@ def errors_of_types(root, files):
     return found
 
 
+@pytest.mark.slow
 def test_the_type_checker_says_file_and_line(copy):
     """All in one copy, for the type checker reads every file that they import, each time anew."""
     for mistake in FOR_THE_TYPE_CHECKER:
@@ -331,6 +332,7 @@ def each_alone():
         yield pytest.param(mistake, id=mistake.name, marks=marks)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("mistake", list(each_alone()))
 def test_a_short_test_says_file_and_line(copy, mistake):
     line = mistake.plant(copy)

@@ -10,7 +10,6 @@ from typing import NamedTuple
 
 import matplotlib.pyplot as plt
 import pytest
-from forks import Forks
 from results_table import MARKER
 
 from swarm_mj.cli import parse
@@ -41,16 +40,6 @@ CUT_SHORT = {
     "train": "--budget 40 --robots 5 --windows 10 --held-out 1",
     "train --resume": "--budget 80",
 }
-# What most commands load besides, seconds each. Tests of what a command loads have other processes.
-LIBRARIES = [
-    "pandas",  # of rerun
-    "rerun.blueprint",
-    "stable_baselines3",
-    "swarm_mj.learning.train",
-    "swarm_mj.replay.write",
-    "torch._dynamo",  # of torch's optimisers
-    "torch.utils.tensorboard",
-]
 ONLY_PARSED = re.compile("--minutes 30|study run impairments")  # the page trains less before
 # A block that is a file says so in line 1.
 FILE = re.compile(r"^(?:# (?P<file>[a-z_]+\.(?:py|toml))|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
@@ -93,14 +82,6 @@ LINKS = [
 MAP = re.findall(r"^  ([a-z_]+(?:\.py|/))", TEXTS["code.md"], re.MULTILINE)
 
 
-@pytest.fixture(scope="module")
-def loaded_forks(tmp_path_factory):
-    """Runs commands as `forks` does, of which all share the heavy libraries."""
-    programs = Forks(tmp_path_factory.mktemp("said"), LIBRARIES)
-    yield programs
-    programs.close()
-
-
 @pytest.fixture
 def page_folder(here, monkeypatch):
     """An empty folder with the repository's results, where a page's own files can be imported."""
@@ -116,12 +97,12 @@ def page_folder(here, monkeypatch):
 
 @pytest.mark.slow  # what it shows is tested elsewhere; here, that it is shown as it is
 @pytest.mark.parametrize("page", RUN)
-def test_a_page_runs_from_top_to_bottom(page, page_folder, loaded_forks):
+def test_a_page_runs_from_top_to_bottom(page, page_folder, forks):
     namespace = {"__name__": "page"}
     for block in RUN[page]:
         if block.language == "sh":
             for _, line in (each for each in LINES if each[1] in block.code):
-                run_command(line, page_folder, loaded_forks)
+                run_command(line, page_folder, forks)
             continue
         if file := FILE.match(block.code):
             (page_folder / (file["file"] or file["scene"])).write_text(block.code)

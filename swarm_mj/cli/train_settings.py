@@ -6,6 +6,7 @@ usual one of the credit assignment, or in a resumed run the run's own.
 
 from collections.abc import Iterator
 from dataclasses import Field, fields, replace
+from functools import cache
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
@@ -196,9 +197,17 @@ def _usual(place: str) -> str:
 
 def _usual_of(credit: str, place: str) -> str:
     value_of = attrgetter(place)
-    usual = value_of(usual_settings(credit, PRESETS["paper"]("stationary"), (40,)))
-    other = value_of(usual_settings(credit, PRESETS["reference"]("flocking"), (40,)))
+    first, second = _usual_runs(credit)
+    usual = value_of(first)
     # The two missions differ in preset and task on purpose: of these, the first one's are usual.
-    if usual != other and place not in ("mission.preset", "mission.task"):
+    if usual != value_of(second) and place not in ("mission.preset", "mission.task"):
         return "the preset's own"
     return as_typed(usual)
+
+
+@cache
+def _usual_runs(credit: str) -> tuple[Training, Training]:
+    """Return the usual settings for two missions, which show what depends on the preset."""
+    paper = PRESETS["paper"]("stationary")
+    reference = PRESETS["reference"]("flocking")
+    return usual_settings(credit, paper, (40,)), usual_settings(credit, reference, (40,))

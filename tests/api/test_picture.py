@@ -100,6 +100,7 @@ def test_obstacles_and_the_channel_are_shown():
     assert "preset urban, 1 Mbit/s" in texts(figure)
 
 
+@pytest.mark.slow
 def test_obstacles_are_drawn_without_rerun():
     """In a process of its own, for others here import it."""
     code = (

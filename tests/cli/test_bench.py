@@ -60,6 +60,7 @@ def test_bench_shows_learning_and_leaves_the_evaluation_out(quick, capsys):
     assert learned["rows"] == [{"name": "train --credit team", "values": [12.34], "unit": "/ s"}]
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("quick")
 @pytest.mark.parametrize(
     ("flag", "name", "robots"),

@@ -1,9 +1,12 @@
 """The learning bench measures what it says; how fast is not tested, for machines are shared."""
 
+import pytest
+
 from swarm_mj.cli import bench_simulation
 from swarm_mj.cli.bench_learning import learning_rows
 
 
+@pytest.mark.slow
 def test_networks_are_timed_alone_and_by_the_batch_and_both_kinds_of_credit_train(monkeypatch):
     monkeypatch.setattr(bench_simulation, "REPETITIONS", 1)
     rows = list(learning_rows(num_robots=4, seconds=0.05))

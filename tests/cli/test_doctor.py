@@ -46,6 +46,7 @@ def test_only_what_is_broken_fails_and_the_table_says_what_to_do(diagnosis, find
     assert printed.endswith(f"\nswarm_mj {verdict}.\n")
 
 
+@pytest.mark.slow
 def test_this_machine_flies(succeed):
     done = succeed("doctor", "--json")
     states = {each["name"]: each["state"] for each in json.loads(done.stdout)["findings"]}

@@ -121,6 +121,7 @@ def evaluate_and_end(forks, tmp_path_factory):
     return run
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("jobs", "count"), [(1, 1), (2, 3)])
 def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
     succeed, evaluate_and_end, tmp_path, whole, jobs, count

@@ -113,6 +113,7 @@ def test_a_flight_over_a_table_of_gains(succeed, tmp_path):
     assert "table:gains.csv" in done.stdout
 
 
+@pytest.mark.slow
 def test_an_evaluation_makes_them_in_every_process_and_says_which(succeed, tmp_path):
     evaluate = ("evaluate", *SMALL, *ALL, "--policy", "my_parts:Coin", "mst", "--episodes", 30)
     for name, jobs in (("one", 1), ("two", 2)):
@@ -239,6 +240,7 @@ def typed(forks, trained):
     return run
 
 
+@pytest.mark.slow
 def test_a_run_goes_on_bit_for_bit_if_its_parts_are_named_again(typed, trained):
     code, complaint, was_imported = typed("train", "--out", "run", "--resume", "--budget", 256)
     assert (code, was_imported) == (2, False)
@@ -282,6 +284,7 @@ def test_a_folder_never_names_what_is_imported(typed, arguments):
     assert complaint.count("error:") == 1
 
 
+@pytest.mark.slow
 def test_an_evaluation_loads_them_in_every_process(typed):
     ended = typed(
         *("evaluate", "--policy", "w", "tdma", "--features", "my_parts:Ages"),

@@ -117,6 +117,7 @@ def test_an_interrupt_or_a_lack_of_opengl_leaves_nothing(tdma, here, monkeypatch
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_the_first_picture_of_a_process_needs_no_variables(tdma, here):
     """MuJoCo is loaded long before a video chooses how to render."""
     code = (

@@ -97,6 +97,7 @@ def ctrl_c_at(method, *calls):
     signal.signal(signal.SIGINT, before)
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("here")
 def test_the_device_is_kept_until_another_is_named(monkeypatch, capsys):
     monkeypatch.setattr(torch.cuda, "is_available", lambda: False)
@@ -133,6 +134,7 @@ def test_ctrl_c_in_an_evaluation_leaves_it_for_later(here, capsys):
     assert (here / "r" / "policy.safetensors").exists()
 
 
+@pytest.mark.slow
 def test_a_second_ctrl_c_breaks_off_and_leaves_nothing_half_done(here, capsys):
     with ctrl_c_at("_on_step", 40, 45):
         assert train("--out", "r", *SMALL, "--budget", 256) == 130
@@ -154,6 +156,7 @@ def test_ctrl_c_while_it_is_being_prepared_leaves_nothing(here, monkeypatch, cap
     assert files(here) == []
 
 
+@pytest.mark.slow
 def test_limits_are_kept_and_may_be_moved(here, capsys):
     train("--out", "r", *SMALL, "--budget", 128)
     train("--out", "r", "--resume", "--budget", 256, "--replay-every", 256)
@@ -176,6 +179,7 @@ def test_credit_team_trains_a_flock_for_its_velocities(capsys):
     assert "m²/s²" in capsys.readouterr().out
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("here")
 def test_a_run_of_several_sizes_in_a_folder_of_odd_letters_is_kept_and_quoted(capsys):
     out = Path("runs") / "a [red] b"

@@ -177,6 +177,7 @@ def photographed(request, tmp_path_factory):
     return np.load(path)
 
 
+@pytest.mark.slow
 def test_top_camera_sees_the_robots_where_they_are(photographed):
     picture = photographed["picture"].astype(int)
     assert picture.shape == (480, 480, 3)

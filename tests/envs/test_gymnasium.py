@@ -85,6 +85,7 @@ if __name__ == "__main__":
 """
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("context", ["spawn", "forkserver"])
 def test_processes_that_start_anew_import_it_by_its_name(context, tmp_path):
     """No file but this one names the package; the processes have not imported it."""
@@ -197,6 +198,7 @@ print(env.render().shape)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("opengl")
 def test_a_script_that_closes_nothing_ends_quietly():
     command = [sys.executable, "-W", "ignore", "-c", DRAW_AND_END]
@@ -237,6 +239,7 @@ def test_a_human_sees_a_mission_in_a_window():
     assert (done.returncode, done.stdout) == (0, "seen\n"), done.stderr
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("opengl")
 @pytest.mark.skipif(sys.platform != "linux", reason="other systems have a display always")
 def test_without_a_display_it_says_so():

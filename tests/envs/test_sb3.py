@@ -31,6 +31,7 @@ def mean_age(model):
     return np.mean(ages)
 
 
+@pytest.mark.slow
 def test_maskable_ppo_learns():
     """From radio silence by collisions, 15 windows old, to 5; who never talks is 40 windows old."""
     env = make_vec_env("stationary", 8, reward="credit", num_robots=5, num_windows=100)
@@ -93,6 +94,7 @@ def test_a_stored_actor_decides_as_the_trained_one(tmp_path, algorithm, net_arch
         np.testing.assert_allclose(found, expected, atol=1e-5)
 
 
+@pytest.mark.slow
 def test_a_stored_actor_flies_from_the_command_line(here, forks):
     model = trained(env=VecMonitor(make_vec_env("stationary", 2, seed=1, **SMALL)))
     save_policy(model, "runs/sb3")

@@ -69,6 +69,7 @@ def sleep(piece):
     time.sleep(piece)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("num_jobs", "num_pieces"), [(1, 7), (9, 2), (2, 0)])
 def test_every_piece_is_done_once_by_this_process_if_it_is_the_only_one(num_jobs, num_pieces):
     done = dict(Local(num_jobs=num_jobs).run(square, range(num_pieces)))
@@ -78,12 +79,14 @@ def test_every_piece_is_done_once_by_this_process_if_it_is_the_only_one(num_jobs
         assert {pid for _, pid in done.values()} == {os.getpid()}
 
 
+@pytest.mark.slow
 def test_two_jobs_work_at_the_same_time(tmp_path):
     a, b = tmp_path / "a", tmp_path / "b"
     pids = dict(Local(num_jobs=2).run(patient, [(a, b), (b, a)]))
     assert len({os.getpid(), *pids.values()}) == 3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("num_jobs", [1, 2])
 def test_a_failure_is_raised_here(num_jobs):
     with pytest.raises(ValueError, match="three is too many"):
@@ -91,11 +94,13 @@ def test_a_failure_is_raised_here(num_jobs):
     assert multiprocessing.active_children() == []
 
 
+@pytest.mark.slow
 def test_a_job_that_dies_is_noticed():
     with pytest.raises(OSError, match="ended from outside"):
         list(Local(num_jobs=2).run(die_if, [False, True]))
 
 
+@pytest.mark.slow
 def test_jobs_hear_no_ctrl_c_and_start_no_threads(monkeypatch):
     monkeypatch.setenv("OMP_NUM_THREADS", "7")
     monkeypatch.delenv("MKL_NUM_THREADS", raising=False)
@@ -107,6 +112,7 @@ def test_jobs_hear_no_ctrl_c_and_start_no_threads(monkeypatch):
     assert dict(os.environ) == before
 
 
+@pytest.mark.slow
 def test_breaking_off_ends_the_jobs_at_once():
     work = Local(num_jobs=2).run(sleep, [0.0, 600.0, 600.0])
     next(work)
@@ -115,6 +121,7 @@ def test_breaking_off_ends_the_jobs_at_once():
     assert multiprocessing.active_children() == []
 
 
+@pytest.mark.slow
 def test_jobs_run_nothing_of_the_folder_here(trapped):
     assert sorted(product for _, (product, _) in Local(num_jobs=2).run(square, [2, 3])) == [4, 9]
     assert not trapped.exists()
@@ -178,6 +185,7 @@ def test_an_engine_that_is_not_installed_leaves_nothing(here, monkeypatch, capsy
     assert list(here.iterdir()) == []
 
 
+@pytest.mark.slow
 def test_ray_that_does_not_start_is_an_error_of_one_line(monkeypatch):
     """Ray raises bare exceptions, of several lines: they were a traceback."""
 

@@ -68,6 +68,7 @@ def test_the_last_seed_is_allowed():
     assert study(seed=2**63 - 100).batches[-1].seeds[-1] == 2**63 - 1
 
 
+@pytest.mark.slow
 def test_more_missions_than_can_be_listed_are_refused():
     """Before policies are made for them."""
     regimes = tuple(paper(num_robots=n) for n in range(2, 1003))

@@ -53,6 +53,7 @@ def installation(tmp_path_factory):
     return root
 
 
+@pytest.mark.slow
 @pytest.mark.fault("odd machine: read-only, no home")
 def test_a_read_only_installation_without_a_home_works(installation, tmp_path):
     """Fault 23: even `--version` was a traceback."""
@@ -63,6 +64,7 @@ def test_a_read_only_installation_without_a_home_works(installation, tmp_path):
     assert [path.name for path in tmp_path.iterdir()] == ["scene.xml"]
 
 
+@pytest.mark.slow
 @pytest.mark.fault("odd machine: read-only, no home")
 def test_figures_need_no_folder_of_their_own(tmp_path):
     """Fault 23, too: matplotlib complained in two lines."""
@@ -98,6 +100,7 @@ def test_any_terminal_shows_what_it_can(monkeypatch, encoding, command):
     assert ("²" in text) is (command is not BENCH and encoding != "ascii")
 
 
+@pytest.mark.slow
 @pytest.mark.fault("odd machine: terminals")
 def test_closed_streams_get_no_file_s_number(tmp_path):
     """What libraries complain of would else stand in the replay."""

@@ -64,6 +64,7 @@ def ended(forks, tmp_path, tries):
     return runs
 
 
+@pytest.mark.slow
 @needs_proc
 @pytest.mark.fault("orphans of killed programs")
 @pytest.mark.parametrize("end", ENDS)
@@ -73,6 +74,7 @@ def test_jobs_that_compute_end_with_their_parent(ended, tmp_path, end):
     assert all(done.returncode for done in ended(2, end, (0.0, 1.0), tmp_path / "busy.py"))
 
 
+@pytest.mark.slow
 @needs_proc
 @pytest.mark.fault("orphans of killed programs")
 def test_an_evaluation_s_jobs_end_with_it(ended):
@@ -81,6 +83,7 @@ def test_an_evaluation_s_jobs_end_with_it(ended):
     assert list(ended(1, signal.SIGKILL, (0.1, 4.0), "swarm_mj", "evaluate", *jobs))
 
 
+@pytest.mark.slow
 @needs_proc
 @pytest.mark.fault("orphans of killed programs")
 @pytest.mark.parametrize("end", ENDS)
@@ -120,6 +123,7 @@ def asked():
         server.shutdown(socket.SHUT_RDWR)
 
 
+@pytest.mark.slow
 @pytest.mark.fault("telemetry of dependencies")
 def test_a_server_tells_nobody_that_it_is_used(replay, tmp_path, monkeypatch, asked):
     """Fault 4: it would, to a user who has run rerun before, once its page is opened."""

@@ -22,6 +22,7 @@ from swarm_mj.policies.stored import read_policy
 from swarm_mj.policies.tuning import TABLE, read_table
 
 
+@pytest.mark.slow
 @pytest.mark.fault("damaged files are told")
 def test_damaged_replays_are_told_by_all_readers(tmp_path, capsys, tries):
     """Fault 11: a flip in what a replay holds was shown as if it had been flown, or crashed."""

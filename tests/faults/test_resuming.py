@@ -107,6 +107,7 @@ CRAFTED = [
 ]
 
 
+@pytest.mark.slow
 @pytest.mark.fault("crafted files are refused")
 @pytest.mark.parametrize("content", [*CRAFTED, "a pipe"])
 def test_crafted_progress_is_refused(evaluate, tmp_path, capsys, content):

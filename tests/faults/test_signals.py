@@ -148,6 +148,7 @@ LATE = {  # what a command loads only when it has begun, and what makes the comm
 }
 
 
+@pytest.mark.slow
 @pytest.mark.fault("signals")
 @pytest.mark.parametrize("module", LATE)
 def test_a_hang_up_that_a_module_swallows_while_it_loads_ends_the_command(forks, tmp_path, module):
@@ -208,6 +209,7 @@ def unheard(forks, tmp_path):
     return lambda *arguments: forks.run(tmp_path, script, *arguments)
 
 
+@pytest.mark.slow
 @pytest.mark.fault("readers that go away")
 @pytest.mark.parametrize("kind", ["pipe", "terminal"])
 @pytest.mark.parametrize(

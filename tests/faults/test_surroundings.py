@@ -43,6 +43,7 @@ def script(tmp_path):
     return write
 
 
+@pytest.mark.slow
 @pytest.mark.fault("odd machine: terminals")
 @pytest.mark.parametrize("kind", SURROUNDINGS)
 @pytest.mark.parametrize("command", COMMANDS)
@@ -145,6 +146,7 @@ def test_a_look_for_another_machine_is_noticed(forks, script, tmp_path):
     assert done.returncode == 77
 
 
+@pytest.mark.slow
 @pytest.mark.fault("one output, one process")
 def test_of_two_at_once_one_writes_and_the_other_is_refused(tmp_path, tries):
     """Two real processes, which begin together: what is left is whole, and one's own."""

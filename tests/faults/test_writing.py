@@ -115,6 +115,7 @@ WRITTEN = {
 }
 
 
+@pytest.mark.slow
 @pytest.mark.fault("outputs on full disks")
 @pytest.mark.parametrize("kind", WRITTEN)
 def test_no_kind_of_output_is_left_in_part(here, capsys, kind):
@@ -143,6 +144,7 @@ def test_a_training_on_a_full_disk_ends_and_goes_on(here, capsys):
     assert main(["train", "--out", "r", "--resume", "--budget", "128"]) == 0
 
 
+@pytest.mark.slow
 @pytest.mark.fault("memory and threads of replays")
 def test_replays_leave_no_threads_and_no_memory(flown, tmp_path, tries):
     """Fault 10."""

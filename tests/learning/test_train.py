@@ -57,6 +57,7 @@ def evaluated_at(progress):
     return [row.decisions for row in progress.curve]
 
 
+@pytest.mark.slow
 def test_evaluations_and_replays_come_at_the_start_at_intervals_and_at_the_end(whole):
     folder, progress, _ = whole
     assert evaluated_at(progress) == [0.0, 64.0, 128.0, 192.0]
@@ -104,6 +105,7 @@ def test_the_policy_kept_is_the_one_that_was_chosen_and_flies_as_its_card_says(w
     assert summary.aoi_mean.mean() == pytest.approx(progress.choice.kept.mean)
 
 
+@pytest.mark.slow
 def test_an_interrupted_run_keeps_its_best_evaluation_and_chooses_later_and_anew(tmp_path):
     progress = run(TRAINING, tmp_path / "run", 64, StopAfter(9))
     assert progress.choice is None
@@ -133,6 +135,7 @@ def judge(monkeypatch, objectives):
     monkeypatch.setattr(held_out, "held_out_costs", judged)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("sitting", [10, 1000])
 def test_a_run_stops_when_evaluations_bring_no_gain_however_often_it_was_interrupted(
     tmp_path, monkeypatch, sitting

@@ -190,6 +190,7 @@ def test_a_plain_network_keeps_the_names_of_its_features_too(plain, monkeypatch)
     refused(plain, 'other paper features: number 1 of them was "is oneself" and is "L" now')
 
 
+@pytest.mark.slow
 def test_a_gnn_is_loaded_without_torch_until_it_flies(policy):
     code = (
         "import sys; from pathlib import Path; import swarm_mj; "
@@ -362,6 +363,7 @@ def test_a_policy_may_be_a_link_as_in_caches(policy, tmp_path):
     assert read_policy(tmp_path / "link")[1] == read_policy(policy)[1]
 
 
+@pytest.mark.slow
 def test_a_plain_network_flies_without_torch(plain):
     code = (
         "import sys; sys.modules['torch'] = None; import swarm_mj; "

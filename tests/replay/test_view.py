@@ -114,6 +114,7 @@ def page_of(said):
     return None
 
 
+@pytest.mark.slow
 def test_the_page_is_served_and_no_address_but_its_own_is_shown(served):
     address, said = served
     said.seek(0)

@@ -122,6 +122,7 @@ def files_of(folder):
     return sorted(path.name for path in Path(folder).glob("*.nb*"))
 
 
+@pytest.mark.slow
 def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
     """In another file: a function, a constant, a class that an index names and that is gone.
 
@@ -139,6 +140,7 @@ def test_functions_are_compiled_anew_when_what_they_call_changes(checkout):
     assert files_of(beside) == before
 
 
+@pytest.mark.slow
 def test_a_file_may_be_imported_by_two_names(tmp_path):
     """What a cache holds names classes by their module, which may not exist by that name."""
     (tmp_path / "inside").mkdir()
@@ -157,6 +159,7 @@ def test_a_file_may_be_imported_by_two_names(tmp_path):
         assert done.stdout.strip() == "2.0", done.stderr
 
 
+@pytest.mark.slow
 def test_the_cache_is_where_it_is_to_be_else_in_the_user_s_folder_or_nowhere(checkout, tmp_path):
     """A file where the package's folder should be cannot be written to by anyone."""
     value, _, path = checkout.run(NUMBA_CACHE_DIR=str(tmp_path / "given"))
@@ -172,6 +175,7 @@ def test_the_cache_is_where_it_is_to_be_else_in_the_user_s_folder_or_nowhere(che
     assert checkout.run(XDG_CACHE_HOME=nowhere, HOME=nowhere) == (4.0, False, "None")
 
 
+@pytest.mark.slow
 def test_ctrl_c_interrupts_only_once_a_function_is_whole(checkout):
     """Broken off, the process crashed when it ended, or failed of a function half made.
 
@@ -182,6 +186,7 @@ def test_ctrl_c_interrupts_only_once_a_function_is_whole(checkout):
     assert checkout.python(INTERRUPTED) == "1 4.0"
 
 
+@pytest.mark.slow
 def test_what_compiled_functions_call_is_not_compiled_for_python(checkout):
     """From the cache, it is a part of its caller, and nothing that compiles is imported for it."""
     assert checkout.python(PARTS).split() == ["True", "0", "1", "4.0"]
@@ -239,6 +244,7 @@ def test_a_loop_that_makes_no_arrays_counts_no_references():
         zeros(3)
 
 
+@pytest.mark.slow
 def test_what_is_compiled_is_counted_as_it_begins(checkout):
     lines = checkout.python(SAID).split("\n")
     assert [line.endswith(f": function {n} ...") for n, line in enumerate(lines, 1)] == [True] * 2

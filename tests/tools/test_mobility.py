@@ -38,6 +38,7 @@ def written(forks, flown):
     return text_of
 
 
+@pytest.mark.slow
 def test_a_trace_leads_every_robot_to_where_it_was_to_a_millimetre(written, flown):
     """Each leg begins where the one before ended, and takes a window of 0.1 s at its speed."""
     footage = read_footage(flown / "a.rrd")
@@ -58,6 +59,7 @@ def test_a_trace_leads_every_robot_to_where_it_was_to_a_millimetre(written, flow
         np.testing.assert_allclose(target[:2], footage.position_m[k, int(robot)], atol=1e-3)
 
 
+@pytest.mark.slow
 def test_a_table_has_a_row_for_each_robot_and_window(written, flown):
     footage = read_footage(flown / "a.rrd")
     rows = list(csv.DictReader(written("a.csv").splitlines()))

@@ -28,6 +28,7 @@ def notebook(path, *codes):
     return path
 
 
+@pytest.mark.slow
 def test_a_page_has_text_code_and_outputs_in_order(tmp_path):
     page = page_of(notebook(tmp_path / "a.ipynb", *CELLS.values()))
     expected = [
@@ -56,6 +57,7 @@ def test_a_cell_that_fails_is_an_error(tmp_path):
         page_of(notebook(tmp_path / "a.ipynb", "1 / 0"))
 
 
+@pytest.mark.slow
 def test_a_film_shows_its_middle_until_it_plays(tmp_path):
     """Ten pictures, each brighter than the one before."""
     pictures = (np.full((64, 64, 3), 25 * k, np.uint8) for k in range(10))

@@ -40,6 +40,7 @@ def test_a_picture_shows_something(picture, replay, tmp_path):
     assert (pixels.max(axis=2) < 40).mean() > 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [

@@ -138,6 +138,7 @@ def test_a_tiny_experiment_from_nothing_to_its_tables(made):
     assert "fig3.csv is there; --force makes it anew" in done.stderr
 
 
+@pytest.mark.slow
 def test_it_resumes_where_it_broke_off(tiny):
     for broken in ("wide", "flights-1.csv"):
         tiny.broken = {str(tiny.runs / broken)}
@@ -153,6 +154,7 @@ def test_it_resumes_where_it_broke_off(tiny):
     assert names(tiny.results) == ["fig3.csv"]
 
 
+@pytest.mark.slow
 def test_trained_policies_fly_again_at_another_commit_without_training(tiny, monkeypatch):
     assert tiny() == 0
     shutil.rmtree(tiny.runs)  # as in a clone
@@ -163,6 +165,7 @@ def test_trained_policies_fly_again_at_another_commit_without_training(tiny, mon
     assert [parse(command)[1].episodes for command in tiny.seen] == [1, 1]
 
 
+@pytest.mark.slow
 def test_runs_of_another_experiment_or_commit_are_not_resumed(tiny, capsys):
     tiny.broken.add(str(tiny.runs / "narrow"))
     assert tiny() == 130
@@ -217,6 +220,7 @@ def test_a_wrong_experiment_is_refused_before_any_work(tiny, capsys, old, new, s
     assert tiny.seen == []
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("figure", ["fig3", "fig4", "fig5", "fig6"])
 def test_an_experiment_flies_all_points_of_its_figure(figure):
     work = program.read_work(figure, program.Settings())

@@ -44,6 +44,7 @@ def test_eq9_sharing_plans_is_planning_apart(preset, task):
     assert flight.num_taken > 0
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("task", TASKS)
 def test_eq9_sharing_is_planning_apart_in_a_team_of_40(task):
     flight = witnessed(paper(task, num_robots=40), 40, settings=NEAR_SIGHTED)
@@ -72,6 +73,7 @@ def test_a_team_that_knows_how_all_start_plans_from_the_first_slot():
 SMALL = paper("stationary", num_robots=6)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(
     ("mission", "seed", "channel"),
     [
