@@ -79,8 +79,9 @@ check: $(DEV)
 same: setup
 	$(BIN)/python tools/same.py $(ARGS)
 
-# Tests of a module run in one process, which has its fixtures; both share numba's cache on disk.
-PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder
+# Tests of a module run in one process, which has its fixtures; both share numba's cache on disk. Tests
+# start hundreds of processes, each of which would compile Python anew if its bytecode were not kept.
+PYTEST := env -u PYTHONDONTWRITEBYTECODE $(BIN)/python -m pytest --numprocesses 2 --dist loadscope --no-loadscope-reorder
 
 test: $(DEV)
 	$(PYTEST) -m "not slow" $(ARGS)
