@@ -35,8 +35,9 @@ for line in sys.stdin:
 
 
 def files(folder):
-    """The files in a folder and below it, by their names there."""
-    return sorted(str(path.relative_to(folder)) for path in folder.rglob("*") if path.is_file())
+    """The files in a folder and below it, by their names there; bytecode is Python's business."""
+    found = (path for path in folder.rglob("*") if path.parent.name != "__pycache__")
+    return sorted(str(path.relative_to(folder)) for path in found if path.is_file())
 
 
 class Forks:

@@ -93,6 +93,7 @@ def test_the_share_heard_is_that_of_the_pairs_of_active_robots(failure_fraction)
     assert flown.summary.heard_share == pytest.approx(np.mean(heard))
 
 
+@pytest.mark.slow
 def test_numpys_numbers_can_be_saved(here):
     """In a Python without the tests' checks of types, which admit Python's numbers only."""
     subprocess.run([sys.executable, "-c", NUMPYS], check=True, cwd=here)

@@ -43,6 +43,7 @@ def quick(monkeypatch, here):
 QUICK = ("bench", "--missions", "1", "--seconds", "0.1", "--episodes", "0")
 
 
+@pytest.mark.slow
 def test_bench_shows_learning_and_leaves_the_evaluation_out(quick, capsys):
     assert main([*QUICK, "--json", "new/b.json"]) == 0
     printed = capsys.readouterr().out

@@ -53,6 +53,7 @@ def test_pauses_for_other_programs_do_not_count_unless_threads_share_the_work():
     assert clock_of(1) is time.thread_time
 
 
+@pytest.mark.slow
 def test_worlds_are_timed_against_free_space_in_the_same_physics():
     rows = {row.name: row.value for row in world_rows(2, 0.05)}
     assert all(value > 0 for value in rows.values())

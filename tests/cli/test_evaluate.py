@@ -168,6 +168,7 @@ def test_resuming_what_never_began_begins_it(succeed, tmp_path, whole):
 FAIL = ("--failure-fraction", "0", "0.4", "--policy", "mst", "--episodes", "3")
 
 
+@pytest.mark.slow
 def test_robots_that_fail_are_another_regime_in_results_and_progress(
     evaluate_and_end, succeed, refusal, tmp_path
 ):

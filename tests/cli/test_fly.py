@@ -150,6 +150,7 @@ def test_odd_names_are_kept_and_the_summary_names_the_tuned_probability(succeed,
     assert config["observer"] == 2
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize(("flag", "name"), [("--record", "a.rrd"), ("--json", "a.json")])
 def test_an_existing_file_needs_force(succeed, refusal, tmp_path, flag, name):
     path = tmp_path / name

@@ -77,6 +77,7 @@ def test_bad_input_is_one_clear_line(refusal, line):
     assert REFUSED[line] in refusal(*line.split())
 
 
+@pytest.mark.slow
 def test_an_evaluation_beside_other_policies(capsys, tmp_path):
     """The same numbers from one process and from two; names as typed, without what is too much."""
     policies = ["--policy", "runs/x/policy", "runs/y", "mst", "runs/y", "--baseline", "runs/y"]

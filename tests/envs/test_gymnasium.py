@@ -146,6 +146,7 @@ def pictures():
     return drawn
 
 
+@pytest.mark.slow
 @pytest.mark.usefixtures("opengl")
 def test_single_environments_are_drawn(pictures):
     assert len({picture.tobytes() for pair in pictures for picture in pair}) == 12

@@ -70,6 +70,7 @@ def test_evaluations_and_replays_come_at_the_start_at_intervals_and_at_the_end(w
     assert [float(row["aoi"]) for row in rows] == [row.costs.aoi for row in progress.curve]
 
 
+@pytest.mark.slow
 def test_tensorboard_has_the_numbers_that_matter(whole):
     folder, progress, _ = whole
     events = EventAccumulator(str(folder / TENSORBOARD)).Reload()

@@ -34,6 +34,7 @@ def refusal(its_needs, output=None):
     return str(refused.value)
 
 
+@pytest.mark.slow
 def test_a_peak_outlasts_what_was_held():
     Path("/proc/self/clear_refs").write_text("5")  # or the peak is that of an earlier test
     before = needs.peak_memory()

@@ -114,6 +114,7 @@ def test_the_next_search_starts_where_the_last_ended(tool, monkeypatch, capsys):
     assert flown == [0.3, 0.2, 0.4, 0.5, 0.4, 0.3, 0.5, 0.7, 0.6, 0.8]
 
 
+@pytest.mark.slow
 def test_one_policy_alone_keeps_the_rows_of_the_others(tool, run, tmp_path):
     path = tmp_path / "tuned.csv"
     tool.write_table(read_table(tool.TABLE), path)
@@ -164,6 +165,7 @@ runpy.run_path({str(TOOL)!r}, run_name="__main__")
 """
 
 
+@pytest.mark.slow
 def test_ctrl_c_leaves_the_table_as_it_was(tmp_path):
     table = tmp_path / "a.csv"
     table.write_text("precious")

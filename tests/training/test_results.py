@@ -90,6 +90,7 @@ def test_every_table_of_the_docs_is_of_results_that_are_flown(table):
     assert {name for name in names if not name.startswith("reproduce/")} <= known
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("name", program.STUDIES)
 def test_a_committed_table_has_all_rows_of_its_study(name):
     with (ROOT / "training" / "results" / f"{name}.csv").open(newline="") as file:

@@ -38,6 +38,7 @@ def test_curves_and_results_go_where_the_options_say(experiment, tmp_path):
     assert names == ["rest-curve.csv", "walk-curve.csv"]
 
 
+@pytest.mark.slow
 def test_a_command_that_fails_ends_the_experiment_with_its_code(experiment, tmp_path):
     make, seen = experiment
     assert make(runs=tmp_path / "broken", results=tmp_path)() == 130
