@@ -29,6 +29,9 @@ CONTENTION_RANGES = 1.4  # robots nearer than this contend; tuned for 80 to 1000
 # than the area says, and would contend as if alone, in every slot, for ever.
 MIN_EXPECTED = 3.0  # robots in reach, oneself too, below which robots take turns
 MIN_CROWDS = 8.0  # of robots in reach, below which teams do better by turns
+# Where beliefs are wrong (walls, fading, noise), those who join may drown out the owner each time.
+# A robot without news of it for this many rounds a hop leaves it alone until it has some.
+PATIENCE_ROUNDS = 2.0
 
 
 class Tdma(BroadcastPolicy):
@@ -78,7 +81,8 @@ class SpatialTdma(Tdma):
 
     Who joins the owner of the turn is the rule of `radio.spatial_reuse`: each robot predicts from
     its own buffer, alone, which packets its teammates would decode, and robots that believe the
-    same decide the same. Until a robot has heard of everyone it transmits in its own turn only.
+    same decide the same. Until a robot has heard of everyone it transmits in its own turn only; and
+    so it does in the turns of a robot of which it has had no news for long.
     Large teams' rounds are too long for that: there such robots also send where they win by node
     activation. There is one difference: common random numbers are weighted by a robot's news.
     """
@@ -146,7 +150,7 @@ class SpatialTdma(Tdma):
         buffers = views.buffers
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         knows_all = np.all(buffers.is_known | is_oneself, axis=2)
-        is_sending = knows_all.copy()
+        is_sending = knows_all & self._has_news_of_owner(views)
         keep_joined(
             believed_m=buffers.position_m,
             order=self._order,
@@ -174,6 +178,17 @@ class SpatialTdma(Tdma):
             # A robot that sends tells all that it knows, so it has no news any longer.
             self._news[is_sending[:, :, None] & is_oneself] = 0.0
         return is_sending
+
+    def _has_news_of_owner(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
+        """Return whose news of the turn's owner is as new as it should be at that distance."""
+        mission = np.arange(len(views.now))
+        robot = np.arange(views.num_robots)
+        owner = self._order[mission, slot_of(views.now) % views.num_robots]
+        believed_m = views.buffers.position_m
+        to_owner_m = believed_m[mission, :, owner] - believed_m[:, robot, robot]
+        num_hops = 1.0 + np.linalg.norm(to_owner_m, axis=2) / self._range_m
+        age = views.now[:, None] - views.buffers.timestamp[mission, :, owner]
+        return age <= PATIENCE_ROUNDS * num_hops * views.num_robots * SLOT_WINDOWS
 
 
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:

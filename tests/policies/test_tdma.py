@@ -15,7 +15,7 @@ from spatial_rule import agreed_senders
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tdma import SpatialTdma, Tdma, winners
-from swarm_mj.protocol.buffers import empty_buffers
+from swarm_mj.protocol.buffers import NEVER, empty_buffers
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import radio_of
@@ -84,9 +84,10 @@ def test_age_of_a_fully_connected_team_is_its_closed_form(num_robots):
 
 
 def views_of(position_m, is_known, half=0):
-    """Views of one mission in which robot i believes j at position_m[j], if it knows of it."""
+    """Views of one mission in which robot i just heard that j is at position_m[j], if ever."""
     views = views_at(half, 1, len(position_m))
-    views.buffers.position_m[:], views.buffers.timestamp[:] = position_m, is_known
+    views.buffers.position_m[:] = position_m
+    views.buffers.timestamp[:] = np.where(is_known, 1.0 + views.now, NEVER)
     return views
 
 
@@ -133,6 +134,18 @@ def test_who_joins_by_hand(x_m, threshold, half, expected):
     """Of four on a line that know where everyone is, in the order of their identities."""
     policy = in_order(threshold)
     assert senders(policy, views_of(np.stack([x_m, np.zeros(4)], axis=1), True, half)) == expected
+
+
+def test_an_owner_without_news_for_two_rounds_a_hop_is_left_alone():
+    """Robot 2 is 1000 m, four ranges, from robot 0: five hops, ten rounds of two windows."""
+    position_m = np.stack([[0.0, 100.0, 1000.0, 1100.0], np.zeros(4)], axis=1)
+    views = views_of(position_m, True, half=100)
+    views.buffers.timestamp[0, 2, 0] = views.now[0] - 20.0
+    assert senders(in_order(), views) == {0, 2}
+    views.buffers.timestamp[0, 2, 0] -= 0.5
+    assert senders(in_order(), views) == {0}
+    views.buffers.timestamp[0, 2, 1] -= 100.0  # not of the owner
+    assert senders(in_order(), replace(views, now=views.now + 0.5)) == {1, 3}
 
 
 @given(
