@@ -91,7 +91,9 @@ BY_DESIGN = {
 IN_PAIRS = "two robots that take turns are 0.1 windows old, and by it less than 1"
 TRUSTS = "it shares slots where it believes that to be harmless; docs/policies.md says so"
 LEARNED = "it was trained without such errors, and sees whose turn it is by spatial-tdma's rule"
+PARTS = "1 of 40 teams flies apart within 2 s; one robot hears too late, and returns seconds later"
 KNOWN = {
+    ("age-gain-csma", "5 flock"): PARTS,
     ("gnn", "2 at rest"): IN_PAIRS,
     ("gnn", "2 in long range"): IN_PAIRS,
     ("gnn", "noise"): LEARNED,
