@@ -14,7 +14,8 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from itertools import islice
-from multiprocessing import get_context
+from multiprocessing import get_context, parent_process
+from multiprocessing.synchronize import Event
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -44,6 +45,7 @@ QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "
 GROUP = "processes that fly missions"  # the options' heading
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
+GUARD_POLL_S = 0.2  # how often a process that waits for its guard looks after its parent
 
 
 @runtime_checkable
@@ -72,13 +74,21 @@ class Local:
         if num_jobs <= 1:
             yield from ((index, work(piece)) for index, piece in enumerate(pieces))
             return
-        # Forked processes would inherit locks that MuJoCo's threads hold.
-        with guard() as watch, ProcessPoolExecutor(num_jobs, get_context("spawn")) as pool:
+        context = get_context("spawn")  # forked ones would inherit locks that MuJoCo's threads hold
+        is_guarded = context.Event()
+        processes = ProcessPoolExecutor(
+            max_workers=num_jobs,
+            mp_context=context,
+            initializer=_wait_for_guard,
+            initargs=(is_guarded,),
+        )
+        with guard() as watch, processes as pool:
             with deferred_interrupt() as is_interrupted, _inherited():
                 futures = {pool.submit(work, piece): index for index, piece in enumerate(pieces)}
                 # The pool leaves its processes waiting for work for ever if this one is killed.
                 for process in pool._processes.values():
                     watch(process.pid or 0)
+                is_guarded.set()
             try:
                 if is_interrupted():
                     raise KeyboardInterrupt
@@ -89,6 +99,14 @@ class Local:
             finally:
                 for process in list(pool._processes.values()):
                     process.kill()  # without waiting for the pieces under way
+
+
+def _wait_for_guard(is_guarded: Event) -> None:
+    """Let a process of a pool begin with nothing before it is sure to end with its parent."""
+    parent = parent_process()
+    while not is_guarded.wait(GUARD_POLL_S):
+        if parent is None or not parent.is_alive():
+            os._exit(1)
 
 
 @dataclass(frozen=True, kw_only=True)
