@@ -35,6 +35,19 @@ if __name__ == "__main__":
     sys.exit(script(Options, lambda _: len(list(Local(num_jobs=2).run(busy, [1, 2])))))
 '''
 
+# The same, killed in the moment in which its processes have begun and none has a guard.
+KILLED = BUSY.replace(
+    "    sys.exit(",
+    """    import os, signal
+    from contextlib import contextmanager
+    from swarm_mj.evaluation import engines
+    @contextmanager
+    def guard():
+        yield lambda _: os.kill(os.getpid(), signal.SIGKILL)
+    engines.guard = guard
+    sys.exit(""",
+)
+
 
 @pytest.fixture(scope="module")
 def replay(forks, tmp_path_factory):
@@ -72,6 +85,16 @@ def test_jobs_that_compute_end_with_their_parent(ended, tmp_path, end):
     """Fault 6."""
     (tmp_path / "busy.py").write_text(BUSY)
     assert all(done.returncode for done in ended(2, end, (0.0, 1.0), tmp_path / "busy.py"))
+
+
+@pytest.mark.slow
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+def test_jobs_begin_with_nothing_before_they_are_guarded(forks, tmp_path):
+    (tmp_path / "busy.py").write_text(KILLED)
+    done, mark = signalled(forks, tmp_path, [], 60.0, tmp_path / "busy.py")
+    assert done.returncode == -signal.SIGKILL
+    assert left_after_limit(mark) == {}
 
 
 @pytest.mark.slow
