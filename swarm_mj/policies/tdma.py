@@ -150,7 +150,16 @@ class SpatialTdma(Tdma):
         buffers = views.buffers
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         knows_all = np.all(buffers.is_known | is_oneself, axis=2)
-        is_sending = knows_all & self._has_news_of_owner(views)
+        is_sending = knows_all.copy()
+        leave_lost_owners(
+            timestamp=buffers.timestamp,
+            believed_m=buffers.position_m,
+            order=self._order,
+            turn=slot_of(views.now),
+            now=views.now,
+            range_m=self._range_m,
+            is_sending=is_sending,
+        )
         keep_joined(
             believed_m=buffers.position_m,
             order=self._order,
@@ -179,17 +188,6 @@ class SpatialTdma(Tdma):
             self._news[is_sending[:, :, None] & is_oneself] = 0.0
         return is_sending
 
-    def _has_news_of_owner(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:
-        """Return whose news of the turn's owner is as new as it should be at that distance."""
-        mission = np.arange(len(views.now))
-        robot = np.arange(views.num_robots)
-        owner = self._order[mission, slot_of(views.now) % views.num_robots]
-        believed_m = views.buffers.position_m
-        to_owner_m = believed_m[mission, :, owner] - believed_m[:, robot, robot]
-        num_hops = 1.0 + np.linalg.norm(to_owner_m, axis=2) / self._range_m
-        age = views.now[:, None] - views.buffers.timestamp[mission, :, owner]
-        return age <= PATIENCE_ROUNDS * num_hops * views.num_robots * SLOT_WINDOWS
-
 
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:
     """Return a random order for each mission: the robot at each place of it."""
@@ -199,6 +197,38 @@ def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.n
 def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
     """Return the slot that begins now, counted from 0 at the mission's start."""
     return np.rint(now / SLOT_WINDOWS).astype(np.int64)
+
+
+@compiled()
+def leave_lost_owners(
+    timestamp: Float[np.ndarray, "B N N"],
+    believed_m: Float[np.ndarray, "B N N 2"],
+    order: Int[np.ndarray, "B N"],
+    turn: Int[np.ndarray, "B"],
+    now: Float[np.ndarray, "B"],
+    range_m: float,
+    is_sending: Bool[np.ndarray, "B N"],
+) -> None:
+    """Take robots off the senders that have had no news of the turn's owner for long.
+
+    Args:
+        timestamp: T as each robot knows it [windows].
+        believed_m: Where each robot believes all to be [m].
+        order: The robot at each place; `turn` (mod N) is the owner's.
+        turn: The slot that begins, counted from 0.
+        now: When it begins [windows].
+        range_m: How far a hop reaches [m].
+        is_sending: Those who may join; written in place.
+    """
+    num_missions, num_robots = order.shape
+    round_windows = num_robots * SLOT_WINDOWS
+    for b in range(num_missions):
+        owner = order[b, turn[b] % num_robots]
+        for i in range(num_robots):
+            apart_m = math.sqrt(squared_distance(believed_m[b, i], i, owner))
+            num_hops = 1.0 + apart_m / range_m
+            if now[b] - timestamp[b, i, owner] > PATIENCE_ROUNDS * num_hops * round_windows:
+                is_sending[b, i] = False
 
 
 @compiled()
