@@ -144,9 +144,10 @@ class LearningMind:
         return every
 
     def hears_of_all(self, slot):
-        """Whether what it was told of each of the others is at most two rounds of N windows old."""
+        """Whether what it was told of each of the others is not overdue, in rounds of N windows."""
         others = [told for i, told in self.told.items() if i != self.me]
-        return all(slot - told.slot + 1 <= 4 * self.mission.num_robots for told in others)
+        overdue = 2 * self.settings.overdue_rounds * self.mission.num_robots
+        return all(slot - told.slot + 1 <= overdue for told in others)
 
     def knows_that_all_assent(self):
         """Whether all said lately that they hear of all, and it does as well."""
