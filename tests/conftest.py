@@ -59,9 +59,17 @@ def pytest_configure(config):
             os.environ[CHOICE] = "disable"
 
 
-def pytest_runtest_setup():
-    """Types are checked in every test anew."""
-    check_again()
+_checked_in = None  # the test, or the module of tests, in which types are checked
+
+
+def pytest_runtest_setup(item):
+    """Types are checked anew in every test; where slow tests are left out, in every module."""
+    global _checked_in
+    leaves_out_slow = "not slow" in item.config.option.markexpr
+    checked_in = item.module if leaves_out_slow else item
+    if checked_in is not _checked_in:
+        _checked_in = checked_in
+        check_again()
 
 
 @pytest.fixture(scope="session")
