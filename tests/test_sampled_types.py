@@ -1,4 +1,4 @@
-"""Types and shapes are checked in every test, whatever was called in those before it."""
+"""Types and shapes are checked in every test, no matter what was called in those before it."""
 
 import numpy as np
 import pytest
@@ -10,6 +10,7 @@ from swarm_mj.evaluation.samples import standard_error
 SQUARE = np.ones((2, 2))  # where a row is due
 
 
+@pytest.mark.slow  # where these are left out, types are checked in the first calls of each module
 @pytest.mark.parametrize("test", range(2))
 def test_a_wrong_shape_is_refused_in_the_first_calls_of_each_test(test):  # noqa: ARG001
     with pytest.raises(TypeCheckError):

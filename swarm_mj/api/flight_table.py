@@ -10,12 +10,12 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
+from swarm_mj.protocol.agreement import AGREED
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second, where_flown
 from swarm_mj.simulation.rollout import Summary
 
-AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
 CENTRE = "a centre that knows all positions"
 FATES = {  # rows of the table: a count among the numbers, and its share of the packets sent
     "  heard by at least one robot": "packets_heard",
@@ -107,7 +107,7 @@ def _number(name: str, value: str | int | np.ndarray | None) -> str | int | floa
         return value
     if math.isnan(number := float(value[0])):
         return None
-    is_count = name.startswith("packets_") or name == "complete_window"
+    is_count = name.startswith("packets_") or name.endswith("_window")
     return int(number) if is_count else number
 
 
@@ -149,8 +149,12 @@ def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     left = summary.velocity_variance_left
     if mission.flocks and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
-        verdict = "yes" if left < AGREED else "no"
-        rows[f"  flock agreed: under {AGREED:.0%} is left"] = f"{verdict}, {share}"
+        agreed = summary.agreed_window
+        if agreed is None:
+            verdict = f"no, {share}"
+        else:
+            verdict = f"from window {agreed} on ({agreed * mission.window_s:.2g} s)"
+        rows[f"  flock agreed: under {AGREED:.0%} is left"] = verdict
     return rows
 
 

@@ -12,6 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.policies.registry import make_policy_with
+from swarm_mj.protocol.agreement import agreed_since, has_agreed
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
@@ -47,6 +48,7 @@ class Moment:
     now: Float[np.ndarray, "B"]  # t [windows]
     is_active: Bool[np.ndarray, "B N"]
     is_steady: bool  # whether the window is of the second half
+    first_variance_m2ps2: Float[np.ndarray, "B"]  # velocity variance after the first window
     floor: Float[np.ndarray, "B"]  # the connectivity floor [windows]; nan: custom channel
 
     @property
@@ -64,6 +66,12 @@ class Moment:
     def completed_at(self) -> Float[np.ndarray, "B"]:
         """The end of this window where by then everyone has heard of everyone, or nan [windows]."""
         return np.where(self.costs.is_complete, self.now, np.nan)
+
+    @property
+    def agreed_at(self) -> Float[np.ndarray, "B"]:
+        """The end of this window where the flock has agreed in it, or nan [windows]."""
+        variance = self.costs.velocity_variance_m2ps2
+        return np.where(has_agreed(variance, self.first_variance_m2ps2), self.now, np.nan)
 
 
 Value = TypeVar("Value")  # one number a mission
@@ -110,6 +118,11 @@ def _first(term: Callable[[Moment], Value]) -> Value:
     return field(metadata={"column": Column(term=term, start=np.nan, add=np.fmin)})
 
 
+def _since(term: Callable[[Moment], Value]) -> Value:
+    """Return a column of the first of the latest terms without nan between them."""
+    return field(metadata={"column": Column(term=term, start=np.nan, add=agreed_since)})
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class BatchCosts:
     """The costs of missions, in the order of their seeds; nan is what does not exist.
@@ -135,6 +148,8 @@ class BatchCosts:
     task_cost_last: Float[np.ndarray, "B"] = _last(lambda at: at.task_cost)
     # Everyone had first heard of everyone [windows]; nan: never.
     complete_window: Float[np.ndarray, "B"] = _first(lambda at: at.completed_at)
+    # The flock agreed from then on, to the end [windows]; nan: it did not.
+    agreed_window: Float[np.ndarray, "B"] = _since(lambda at: at.agreed_at)
     # Requests or broadcasts.
     packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.packets.sent)
     # All that were on the air, responses too.
@@ -208,7 +223,10 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)
     floor = np.full(num_missions, np.nan)
+    first_variance = None
     for window in flown:
+        if first_variance is None:
+            first_variance = window.costs.velocity_variance_m2ps2
         states = swarm.states
         now = swarm.now
         # Always an array, so that the loops below are compiled for one kind of arguments.
@@ -224,6 +242,7 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
             now=now,
             is_active=is_active,
             is_steady=bool(now[0] > num_early),
+            first_variance_m2ps2=first_variance,
             floor=floor,
         )
 

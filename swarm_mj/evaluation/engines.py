@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from functools import cache, partial
 from importlib import import_module
 from itertools import islice
-from multiprocessing import get_context, parent_process
-from multiprocessing.synchronize import Event
+from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
 from typing import Any, Protocol, TypeVar, runtime_checkable
@@ -25,7 +24,7 @@ from swarm_mj.policies.registry import stored_policies
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.interrupt import INTERRUPTS, deferred_interrupt
 from swarm_mj.system.packages import code_digest, need
-from swarm_mj.system.processes import SAFE_PATH, guard
+from swarm_mj.system.processes import HAS_GROUPS, SAFE_PATH, guard
 from swarm_mj.system.user_code import is_users
 
 Piece = TypeVar("Piece")  # of a study's work
@@ -45,7 +44,6 @@ QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "
 GROUP = "processes that fly missions"  # the options' heading
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
-GUARD_POLL_S = 0.2  # how often a process that waits for its guard looks after its parent
 
 
 @runtime_checkable
@@ -75,12 +73,11 @@ class Local:
             yield from ((index, work(piece)) for index, piece in enumerate(pieces))
             return
         context = get_context("spawn")  # forked ones would inherit locks that MuJoCo's threads hold
-        is_guarded = context.Event()
+        gate, opener = context.Pipe(duplex=False)
         processes = ProcessPoolExecutor(
             max_workers=num_jobs,
             mp_context=context,
-            initializer=_wait_for_guard,
-            initargs=(is_guarded,),
+            initializer=partial(_wait_at, gate) if HAS_GROUPS else None,
         )
         with guard() as watch, processes as pool:
             with deferred_interrupt() as is_interrupted, _inherited():
@@ -88,7 +85,8 @@ class Local:
                 # The pool leaves its processes waiting for work for ever if this one is killed.
                 for process in pool._processes.values():
                     watch(process.pid or 0)
-                is_guarded.set()
+                if HAS_GROUPS:
+                    os.write(opener.fileno(), bytes(num_jobs))
             try:
                 if is_interrupted():
                     raise KeyboardInterrupt
@@ -101,12 +99,10 @@ class Local:
                     process.kill()  # without waiting for the pieces under way
 
 
-def _wait_for_guard(is_guarded: Event) -> None:
+def _wait_at(gate: Any) -> None:  # noqa: ANN401 - a pipe's end, of another class on Windows
     """Let a process of a pool begin with nothing before it is sure to end with its parent."""
-    parent = parent_process()
-    while not is_guarded.wait(GUARD_POLL_S):
-        if parent is None or not parent.is_alive():
-            os._exit(1)
+    if not os.read(gate.fileno(), 1):  # the parent ended before it opened the gate
+        os._exit(1)
 
 
 @dataclass(frozen=True, kw_only=True)

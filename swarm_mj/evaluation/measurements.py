@@ -167,6 +167,11 @@ class Measurements:
         """
         return np.nan_to_num(self.costs.complete_window, nan=np.inf)
 
+    @property
+    def agreed(self) -> Float[np.ndarray, "B"]:
+        """The windows from which on flocks had agreed; one that did not counts as late as any."""
+        return np.nan_to_num(self.costs.agreed_window, nan=np.inf)
+
     # The paper's own.
 
     def published_mean(self, cost: MissionCost) -> float | None:

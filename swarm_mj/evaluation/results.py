@@ -122,6 +122,16 @@ class Result:
     complete_window_median: float | None = column(lambda own: float(np.median(own.complete)))
     # Of missions in which everyone heard of everyone.
     complete_share: float = column(lambda own: float(np.mean(np.isfinite(own.complete))))
+    # Flocks: when under 1 % of the first velocity variance was left, to the end, over all missions;
+    # None if half never came so far, or for robots that do not flock.
+    agreed_window_median: float | None = later_column(
+        lambda own: float(np.median(own.agreed)) if own.mission.flocks else None, older=None
+    )
+    # Of missions in which it was.
+    agreed_share: float | None = later_column(
+        lambda own: float(np.mean(np.isfinite(own.agreed))) if own.mission.flocks else None,
+        older=None,
+    )
 
     # Differences are this policy's minus the baseline's, on the same missions.
     baseline: str = column(lambda own: own.baseline)

@@ -71,6 +71,13 @@ def _complete(result: Result) -> str:
     return f"{result.complete_share:.0%}"
 
 
+def _agreed(result: Result) -> str:
+    """Return the share of flocks that agreed and, if half did, by when in the median."""
+    share = number(result.agreed_share, ".0%")
+    median = result.agreed_window_median
+    return share if median is None else f"{share}, {median:.0f}"
+
+
 def _task_cost(result: Result) -> str:
     return plus_minus(result.task_cost_mean, result.task_cost_sem)
 
@@ -118,6 +125,10 @@ AGE_MEANING = (
     f"AoI: {AOI.title}, how old a robot's news of another is [{AOI.unit}]; mean over the missions,"
 )
 
+AGREED_MEANING = (
+    "Agreed: flocks that ended with under 1% of their first variance, and from which window on "
+    "they had, a median."
+)
 COMPLETE_MEANING = "All: missions that ended with everyone having heard of everyone."
 
 # What most people read, in one line.
@@ -147,6 +158,12 @@ BRIEF = (
         cell=_task_cost,
         meaning=_task_cost_meaning,
         applies=has_own_cost,
+    ),
+    Shown(
+        heading="agreed",
+        cell=_agreed,
+        meaning=AGREED_MEANING,
+        applies=_shows_variance,
     ),
     Shown(
         heading="heard",
@@ -212,9 +229,13 @@ WIDE = (
         applies=has_own_cost,
     ),
     Shown(
-        heading="velocity\nvariance",
-        cell=lambda result: number(result.velocity_variance_mean, VARIANCE_FORM),
-        meaning=_variance_meaning,
+        heading="variance\nagreed",
+        cell=lambda result: (
+            f"{number(result.velocity_variance_mean, VARIANCE_FORM)}\n{_agreed(result)}"
+        ),
+        meaning=lambda result: (
+            f"{_variance_meaning(result)} {AGREED_MEANING}" if is_flock(result) else ""
+        ),
         applies=_shows_variance,
     ),
     Shown(

@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.policies.policy import Policy
+from swarm_mj.protocol.agreement import agreed_window
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, mean_hops
 from swarm_mj.protocol.packet_counts import Packets
 from swarm_mj.simulation.swarm import Swarm
@@ -50,6 +51,8 @@ class FlownCosts(Generic[Mean, Count, SomeMean, SomeCount]):
     task_cost_last: Mean | None = None  # after the last window
     hops_mean: Mean  # depth of the parent trees, mean over windows [hops]
     complete_window: SomeCount  # after which everyone had heard of everyone, if ever
+    # The first from which on under 1 % of the first velocity variance is left, to the end, if any.
+    agreed_window: SomeCount
     packets_sent: Count  # requests or broadcasts
     packets_transmitted: Count  # all that were on the air, responses too
     packets_attempted: SomeCount  # requests
@@ -135,6 +138,7 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
         task_cost_last=task.last if task else None,
         hops_mean=_mean([window.hops for window in flown]),
         complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
+        agreed_window=agreed_window(variance),
         packets_sent=packets.sent,
         packets_transmitted=packets.transmitted,
         packets_attempted=packets.attempted,

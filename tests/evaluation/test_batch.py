@@ -65,6 +65,7 @@ def test_costs_are_those_of_the_flight(policy, failure_fraction):
         expected = getattr(summary, f"packets_{name}", receptions)
         np.testing.assert_allclose(getattr(costs, f"packets_{name}"), expected)
     np.testing.assert_array_equal(costs.complete_window, summary.complete_window)
+    np.testing.assert_array_equal(costs.agreed_window, summary.agreed_window)
     steady = [window.costs.age_windows for window in flown[15:]]  # the later 16 of 31
     np.testing.assert_allclose(costs.aoi_steady, np.mean(steady, axis=0))
     np.testing.assert_allclose(costs.aoi_floor, np.mean(floors, axis=0))

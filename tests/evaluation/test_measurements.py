@@ -29,6 +29,7 @@ def costs(aoi, **overrides):
         "task_cost": NONE,
         "task_cost_last": NONE,
         "complete_window": NONE,
+        "agreed_window": NONE,
         "packets_sent": np.zeros(3),
         "packets_transmitted": np.zeros(3),
         "packets_delivered": NONE,
@@ -122,7 +123,9 @@ def test_no_share_of_no_packets():
 
 
 def test_a_mission_that_never_was_complete_is_later_than_any():
-    found = measured(costs([0.0] * 3, complete_window=[3.0, math.nan, 2.0]))
+    windows = [3.0, math.nan, 2.0]
+    found = measured(costs([0.0] * 3, complete_window=windows, agreed_window=windows))
+    np.testing.assert_array_equal(found.agreed, [3.0, math.inf, 2.0])
     assert found.complete.tolist() == [3.0, math.inf, 2.0]
 
 

@@ -36,6 +36,7 @@ def costs(aoi, **overrides):
         "task_cost": [None] * n,
         "task_cost_last": [None] * n,
         "complete_window": [None] * n,
+        "agreed_window": [None] * n,
         "packets_sent": [1000] * n,
         "packets_transmitted": [1500] * n,
         "packets_delivered": [250] * n,

@@ -55,9 +55,13 @@ def test_a_cells_lines_are_those_that_its_heading_names():
         hearers_per_packet=1.25,
         packet_bytes=1367,
         velocity_variance_mean=0.12345,
+        agreed_share=0.5,
+        agreed_window_median=35.5,
     )
     assert cell_of("packets\nreached", result) == "3.50\n75%"
     assert cell_of("hearers\nbytes", result) == "1.25\n1,367"
-    assert cell_of("velocity\nvariance", result) == "0.1235"
+    assert cell_of("variance\nagreed", result) == "0.1235\n50%, 36"
+    never = some_result(agreed_share=0.25, agreed_window_median=None)
+    assert cell_of("variance\nagreed", never) == "1.0000\n25%"
     addressed = some_result(packets_per_window=3.5, delivery_ratio=0.25, heard_ratio=None)
     assert cell_of("packets\nreached", addressed) == "3.50\n25%"

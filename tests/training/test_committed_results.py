@@ -13,7 +13,13 @@ from swarm_mj.mission import Mission
 pytestmark = pytest.mark.slow
 
 FILE = Path(__file__).parents[2] / "training" / "results" / "paper-random-walk.csv"
-CHEAP = ("tdma", "round-robin", "spatial-tdma", "planner")
+CHEAP = (
+    "tdma",
+    "round-robin",
+    "mst",
+    "random-flooding",
+    "planner",
+)  # and none that flies otherwise
 
 
 def read(path):
