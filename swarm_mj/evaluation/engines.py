@@ -79,7 +79,8 @@ class Local:
             mp_context=context,
             initializer=partial(_wait_at, gate) if HAS_GROUPS else None,
         )
-        with guard() as watch, processes as pool:
+        # The gate ends before the pool does, which would wait for processes that wait at it.
+        with guard() as watch, processes as pool, gate, opener:
             with deferred_interrupt() as is_interrupted, _inherited():
                 futures = {pool.submit(work, piece): index for index, piece in enumerate(pieces)}
                 # The pool leaves its processes waiting for work for ever if this one is killed.

@@ -106,7 +106,8 @@ def _variance_meaning(result: Result) -> str:
     if not is_flock(result):
         return ""
     cost = VELOCITY_VARIANCE
-    return f"{cost.title.capitalize()} (var.): of the robots' velocities [{cost.unit}]."
+    variance = f"{cost.title.capitalize()} (var.): of the robots' velocities [{cost.unit}]."
+    return f"{variance} {AGREED_MEANING}"
 
 
 def _published(result: Result) -> str:
@@ -233,9 +234,7 @@ WIDE = (
         cell=lambda result: (
             f"{number(result.velocity_variance_mean, VARIANCE_FORM)}\n{_agreed(result)}"
         ),
-        meaning=lambda result: (
-            f"{_variance_meaning(result)} {AGREED_MEANING}" if is_flock(result) else ""
-        ),
+        meaning=_variance_meaning,
         applies=_shows_variance,
     ),
     Shown(

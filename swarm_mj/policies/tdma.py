@@ -151,11 +151,12 @@ class SpatialTdma(Tdma):
         is_oneself = np.eye(views.num_robots, dtype=np.bool_)
         knows_all = np.all(buffers.is_known | is_oneself, axis=2)
         is_sending = knows_all.copy()
+        turn = slot_of(views.now)
         leave_lost_owners(
             timestamp=buffers.timestamp,
             believed_m=buffers.position_m,
             order=self._order,
-            turn=slot_of(views.now),
+            turn=turn,
             now=views.now,
             range_m=self._range_m,
             is_sending=is_sending,
@@ -163,7 +164,7 @@ class SpatialTdma(Tdma):
         keep_joined(
             believed_m=buffers.position_m,
             order=self._order,
-            turn=slot_of(views.now),
+            turn=turn,
             range_m=self._range_m,
             threshold=self._threshold,
             is_sending=is_sending,

@@ -9,13 +9,15 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.swarm import Swarm
 
 
-def test_every_policy_has_a_row_and_takes_some_time(monkeypatch):
+def test_every_policy_has_a_row_of_the_time_that_a_window_s_decisions_take(monkeypatch):
+    """Each decision takes a second here: of a window's one, or two where robots broadcast."""
+    ticks = iter(range(10_000))
+    monkeypatch.setattr(bench_decisions.time, "thread_time", lambda: float(next(ticks)))
     monkeypatch.setattr(bench_decisions, "NUM_WINDOWS", 12)
     names = ("round-robin", "tdma", "planner")
     rows = list(decision_rows(paper("random-walk", num_robots=6), names, 0.0))
     assert [row.name for row in rows] == list(names)
-    for row in rows:
-        assert row.value > 0.0
+    assert [row.value for row in rows] == [1e6, 2e6, 2e6]
 
 
 def test_the_clock_runs_in_every_slot_and_changes_no_decision(monkeypatch):

@@ -41,12 +41,16 @@ KILLED = BUSY.replace(
     """    import os, signal
     from contextlib import contextmanager
     from swarm_mj.evaluation import engines
+    def watch(_):
+        os.kill(os.getpid(), signal.SIGKILL)
     @contextmanager
     def guard():
-        yield lambda _: os.kill(os.getpid(), signal.SIGKILL)
+        yield watch
     engines.guard = guard
     sys.exit(""",
 )
+# The same, whose guard takes nobody.
+REFUSED = KILLED.replace("os.kill(os.getpid(), signal.SIGKILL)", "raise OSError('no guard')")
 
 
 @pytest.fixture(scope="module")
@@ -94,6 +98,18 @@ def test_jobs_begin_with_nothing_before_they_are_guarded(forks, tmp_path):
     (tmp_path / "busy.py").write_text(KILLED)
     done, mark = signalled(forks, tmp_path, [], 60.0, tmp_path / "busy.py")
     assert done.returncode == -signal.SIGKILL
+    assert left_after_limit(mark) == {}
+
+
+@pytest.mark.slow
+@needs_proc
+@pytest.mark.fault("orphans of killed programs")
+def test_jobs_that_cannot_be_guarded_are_not_waited_for(forks, tmp_path):
+    """They wait at a gate that nobody will open: after a minute, it is killed."""
+    (tmp_path / "busy.py").write_text(REFUSED)
+    done, mark = signalled(forks, tmp_path, [signal.SIGKILL], 60.0, tmp_path / "busy.py")
+    assert done.returncode > 0
+    assert "no guard" in done.stderr
     assert left_after_limit(mark) == {}
 
 
