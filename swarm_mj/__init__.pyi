@@ -1,9 +1,11 @@
 """The public names, each once: see `system.lazy_names`. `X as X` says that X is re-exported."""
 
+from swarm_mj.api.check import check_convergence as check_convergence
 from swarm_mj.api.evaluate import Evaluation as Evaluation
 from swarm_mj.api.evaluate import evaluate as evaluate
 from swarm_mj.api.fly import fly as fly
 from swarm_mj.api.run import Run as Run
+from swarm_mj.evaluation.convergence import Convergence as Convergence
 from swarm_mj.mission import Mission as Mission
 from swarm_mj.mission import paper as paper
 from swarm_mj.mission import reference as reference

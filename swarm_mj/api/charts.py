@@ -17,6 +17,7 @@ from swarm_mj.evaluation.figures import style
 from swarm_mj.evaluation.figures.style import look_of
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, is_flock, statistics_of
 from swarm_mj.evaluation.table import missions_title
+from swarm_mj.protocol.agreement import AGREED
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 
 Course = Float[np.ndarray, "T"]
@@ -24,7 +25,6 @@ Course = Float[np.ndarray, "T"]
 PANEL_IN = 2.1  # of a cost over time
 ROW_IN = 0.32  # of a policy
 HEAD_IN = 1.1  # of title and axis
-TITLE_PT = 10.0
 LINE_IN = 0.16  # of a title
 CHARACTERS = 92  # of a line of a title
 FOOT_IN = 0.2
@@ -38,6 +38,7 @@ def draw_flight(
     policy: str,
     window_s: float,
     own_cost: tuple[str, str] | None,
+    agreed_window: int | None = None,
 ) -> Figure:
     """Chart a mission's costs over its windows, the age above the task's own cost.
 
@@ -47,6 +48,7 @@ def draw_flight(
         policy: By which curves have their colour.
         window_s: How long a window is [s].
         own_cost: The name and the unit of the task's cost; None if it has none.
+        agreed_window: The first from which on a flock had agreed; None if it had not.
 
     Returns:
         The figure, 7.5 inches wide.
@@ -54,24 +56,19 @@ def draw_flight(
     colour = look_of(policy).colour
     number = 2 if own_cost else 1  # of panels
     with style.styled():
-        figure, axes = _axes(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
+        figure, axes = style.panels(title, rows=number, height_in=HEAD_IN + number * PANEL_IN)
         for each in axes:
             each.margins(x=0.01)
         _draw_age(axes[0], columns, colour)
         if own_cost:
             name, unit = own_cost
-            cost = columns["task_cost"]
-            least = 0.0
-            axes[1].plot(columns["window"], cost, color=colour)
+            axes[1].plot(columns["window"], columns["task_cost"], color=colour)
             axes[1].set_ylabel(_two_lines(name, unit))
+            axes[1].set_ylim(bottom=0.0)
             if name == Flocking.cost_name:
-                # It falls by orders of magnitude while a flock agrees.
-                axes[1].set_yscale("log")
-                # Far below its largest value the variance of a converged flock is rounding noise.
-                least = max(float(np.min(cost)), MIN_SHARE * float(np.max(cost))) / 2.0
-            axes[1].set_ylim(bottom=least)
+                _draw_agreement(axes[1], columns, agreed_window)
         axes[-1].set_xlabel(f"window of {window_s:g} s")
-    return kept(figure)
+    return style.kept(figure)
 
 
 def draw_evaluation(results: Sequence[Result]) -> Figure:
@@ -98,10 +95,10 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
         parts = figure.subfigures(len(groups), 1, height_ratios=heights_in, squeeze=False)
         for part, title, shown in zip(parts.flat, titles, groups, strict=True):
             said = style.escape_mathtext("\n".join(title))
-            part.suptitle(said, x=0.01, ha="left", fontsize=TITLE_PT)
+            part.suptitle(said, x=0.01, ha="left", fontsize=style.TITLE_PT)
             _draw_policies(part, shown)
         style.write_caption(figure, _origin(results))
-    return kept(figure)
+    return style.kept(figure)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -128,7 +125,7 @@ def draw_learning(
         The figure: ages, on a logarithmic axis, over team decisions.
     """
     with style.styled():
-        figure, (axes,) = _axes("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
+        figure, (axes,) = style.panels("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
         for label, curve in lines.items():
             (line,) = axes.plot(curve.decisions, curve.age, label=style.escape_mathtext(label))
             band = {"color": line.get_color(), "alpha": 0.2}
@@ -143,7 +140,7 @@ def draw_learning(
         axes.xaxis.set_major_formatter("{x:,.0f}")
         axes.legend(frameon=False)
         style.write_caption(figure, origin)
-    return kept(figure)
+    return style.kept(figure)
 
 
 def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:
@@ -194,6 +191,28 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
 
 
+def _draw_agreement(axes: Axes, columns: Mapping[str, Course], agreed_window: int | None) -> None:
+    """Show a flock's velocity variance on a logarithmic axis, and when the flock had agreed."""
+    variance = columns["task_cost"]
+    first = float(variance[0])
+    axes.set_yscale("log")
+    # Far below its largest value the variance of a converged flock is rounding noise.
+    least = MIN_SHARE * float(np.max(variance))
+    is_clipped = float(np.min(variance)) < least
+    axes.set_ylim(bottom=max(float(np.min(variance)), least) / 2.0)
+    if first > 0.0:
+        label = f"{AGREED:.0%} of the first variance"
+        axes.axhline(AGREED * first, color=style.FAINT, linewidth=0.8, label=label)
+    if agreed_window is not None:
+        label = f"agreed from window {agreed_window} on"
+        axes.axvline(agreed_window, color=style.FAINT, linewidth=0.8, linestyle=":", label=label)
+    if is_clipped:
+        said = f"below {MIN_SHARE:g} of the largest: not shown"
+        axes.text(0.99, 0.04, said, transform=axes.transAxes, ha="right", color=style.FAINT)
+    if axes.get_legend_handles_labels()[0]:
+        axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=2)
+
+
 def _draw_mean(axes: Axes, place: int, result: Result, cost: MissionCost) -> None:
     """Draw a policy's mean with its 95 % interval, if there is one, at a height on the axes."""
     look = look_of(result.policy)
@@ -208,19 +227,3 @@ def _draw_mean(axes: Axes, place: int, result: Result, cost: MissionCost) -> Non
 def _two_lines(title: str, unit: str) -> str:
     """Return a cost's title and unit for a low panel, beside which one line would not fit."""
     return f"{title}\n[{unit}]"
-
-
-def _axes(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes]]:
-    """Return a titled figure of panels below each other, over one x."""
-    figure = plt.figure(figsize=(style.WIDTH_IN, height_in), layout="constrained")
-    axes = figure.subplots(rows, 1, sharex="col", squeeze=False)
-    figure.suptitle(style.escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
-    return figure, list(axes.flat)
-
-
-def kept(figure: Figure) -> Figure:
-    """Return a figure as a function hands it back, in a notebook too."""
-    # A notebook shows a figure twice if it is open and a cell's result.
-    if "inline" in str(plt.get_backend()):
-        plt.close(figure)
-    return figure

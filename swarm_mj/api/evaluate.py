@@ -82,7 +82,9 @@ class Evaluation:
         Returns:
             A row per policy, with the columns of `swarm-mj evaluate --csv`. By mission instead
             `policy`, `seed`, `aoi` [windows], `velocity_variance` [m²/s²], and `task_cost`, in
-            the unit of the controller, where the task has one.
+            the unit of the controller, where the task has one. Flocks also have `agreed_window`
+            (the first from which on under 1 % of the first velocity variance is left),
+            `decay_rate` [1/window] and `strayed` (robots out of everyone's range at the end).
 
         Raises:
             ModuleNotFoundError: pandas is missing; the message says how to install it.
@@ -94,15 +96,15 @@ class Evaluation:
             table = DataFrame(asdict(each) for each in self._rows)
             others = table.columns.difference([*FIRST, *LAST], sort=False)
             return table.reindex(columns=[*FIRST, *others, *LAST])
-        rows: list[dict[str, str | int | float]] = []
+        rows: list[dict[str, str | int | float | None]] = []
         for each in self.results:
             for index in range(len(each.aoi)):
-                row: dict[str, str | int | float] = {
+                row: dict[str, str | int | float | None] = {
                     "policy": each.result.policy,
                     "seed": each.result.seed + index,
                 }
-                for name, costs in each.costs.items():
-                    row[name] = costs[index]
+                for name, values in each.numbers.items():
+                    row[name] = values[index]
                 rows.append(row)
         return DataFrame(rows)
 
@@ -207,7 +209,7 @@ def evaluate(
     mission = mission_of(evaluate, task, mission_fields)
     components = {"channel": channel, "controller": controller, "scene": scene}
     for kind, name in components.items():
-        _check_named(kind, name)
+        check_named(kind, name)
     check_value(EngineOptions.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
@@ -232,10 +234,11 @@ def evaluate(
     return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
 
 
-def _check_named(kind: str, part: object) -> None:
+def check_named(kind: str, part: object) -> None:
+    """Raise TypeError for a part that is an object: other processes make theirs by name."""
     if not isinstance(part, str | Path | None):
         why = "it flies missions in several processes, which each make their own"
-        rule = f'evaluate takes the {kind} by name, such as "my_file:Name"'
+        rule = f'this takes the {kind} by name, such as "my_file:Name"'
         raise TypeError(f"{rule}, not {part!r:.80}: {why}")
 
 
@@ -244,5 +247,5 @@ def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
         policies = [policies]
     names = list(policies)  # what is given may be gone through once only
     for name in names:
-        _check_named("policy", name)
+        check_named("policy", name)
     return tuple(listed(map(str, names)))

@@ -17,6 +17,7 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.api.run import Run
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import count_strayed
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
@@ -112,6 +113,7 @@ def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flow
     numbers["wall_seconds"] = wall_s
     numbers["interrupted"] = code != DONE
     numbers["heard_share"] = _heard_share(swarm)
+    numbers["strayed"] = _num_strayed(swarm)
     run = Run(
         mission=mission,
         config=flight.config(),
@@ -164,6 +166,15 @@ def _heard_share(swarm: Swarm) -> float:
         is_known = is_known[is_on][:, is_on]
     own = len(is_known)  # a robot knows itself
     return float((np.sum(is_known) - own) / (is_known.size - own))
+
+
+def _num_strayed(swarm: Swarm) -> int:
+    """Return how many active robots have no other within the mission's range."""
+    states = swarm.states
+    is_active = states.is_active
+    if is_active is None:
+        is_active = np.ones(states.position_m.shape[:2], dtype=np.bool_)
+    return int(count_strayed(states.position_m, swarm.mission.range_m, is_active)[0])
 
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:

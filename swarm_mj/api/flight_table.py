@@ -10,7 +10,7 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.agreement import AGREED
+from swarm_mj.protocol.agreement import AGREED, perfect_rate
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second, where_flown
@@ -155,6 +155,12 @@ def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:
         else:
             verdict = f"from window {agreed} on ({agreed * mission.window_s:.2g} s)"
         rows[f"  flock agreed: under {AGREED:.0%} is left"] = verdict
+        if summary.decay_rate is not None:
+            fall = 1.0 - math.exp(-summary.decay_rate)
+            law = 1.0 - math.exp(-perfect_rate(mission.window_s))
+            rows["  falls at first by"] = f"{fall:.0%} a window ({law:.0%} if all knew all)"
+        if summary.strayed:
+            rows["  robots out of everyone's range"] = f"{summary.strayed} at the end"
     return rows
 
 

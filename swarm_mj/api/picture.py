@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from matplotlib.patches import Polygon, Rectangle
 
-from swarm_mj.api.charts import kept
 from swarm_mj.api.picture_text import (
     BOTTOM_IN,
     HEIGHT_IN,
@@ -24,7 +23,7 @@ from swarm_mj.api.picture_text import (
     share,
     write_text,
 )
-from swarm_mj.evaluation.figures.style import styled
+from swarm_mj.evaluation.figures.style import kept, styled
 from swarm_mj.physics import outlines, scene, state
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.replay import palette

@@ -136,7 +136,7 @@ class Run:
     def plot(self) -> "Figure":
         """Draw the age of information over time and, below, the task's cost.
 
-        Of flocks that is the velocity variance.
+        Of flocks that is the velocity variance, with the window from which on they had agreed.
 
         Returns:
             A figure of matplotlib's. A notebook shows it where it is the cell's result, `savefig`
@@ -159,6 +159,7 @@ class Run:
             policy=self.config["policy"],
             window_s=self.mission.window_s,
             own_cost=self.task_cost,
+            agreed_window=self.summary.agreed_window,
         )
 
     def picture(self, window: int | None = None) -> "Figure":

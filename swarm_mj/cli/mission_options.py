@@ -154,12 +154,17 @@ def about_option(spec: Field[Any]) -> Meaning:
     return about
 
 
-def mission_options(*, is_many: bool = False) -> Iterator[Option]:
-    """Yield the options of a mission; those of several missions take several values."""
+def mission_options(*, is_many: bool = False, is_task_bare: bool = False) -> Iterator[Option]:
+    """Yield the options of a mission.
+
+    Those of several missions take several values. A bare task stands without its flag.
+    """
     heading = "missions: each takes several values; those multiply" if is_many else "mission"
     for spec in SPECS:
         about = about_option(spec)
         about = replace(about, group=about.group or heading, shown=_default_of(spec))
+        if spec.name == "task" and is_task_bare:
+            about = replace(about, group="", is_positional=True, metavar="TASK")
         yield Option(spec, about, f"mission.{spec.name}", is_many=is_many, is_nested=True)
 
 

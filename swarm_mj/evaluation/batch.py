@@ -9,10 +9,11 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.evaluation.ages import connectivity_floor, count_ages
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import count_strayed
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.policies.registry import make_policy_with
-from swarm_mj.protocol.agreement import agreed_since, has_agreed
+from swarm_mj.protocol.agreement import agreed_window, decay
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
@@ -47,8 +48,10 @@ class Moment:
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     now: Float[np.ndarray, "B"]  # t [windows]
     is_active: Bool[np.ndarray, "B N"]
+    position_m: Float[np.ndarray, "B N 2"]
+    range_m: float  # of a packet in silence
     is_steady: bool  # whether the window is of the second half
-    first_variance_m2ps2: Float[np.ndarray, "B"]  # velocity variance after the first window
+    is_last: bool  # whether it is the mission's last
     floor: Float[np.ndarray, "B"]  # the connectivity floor [windows]; nan: custom channel
 
     @property
@@ -68,10 +71,11 @@ class Moment:
         return np.where(self.costs.is_complete, self.now, np.nan)
 
     @property
-    def agreed_at(self) -> Float[np.ndarray, "B"]:
-        """The end of this window where the flock has agreed in it, or nan [windows]."""
-        variance = self.costs.velocity_variance_m2ps2
-        return np.where(has_agreed(variance, self.first_variance_m2ps2), self.now, np.nan)
+    def strayed(self) -> Float[np.ndarray, "B"]:
+        """How many robots are out of everyone's range at the mission's end; nan before."""
+        if not self.is_last:  # distances of all pairs take as long as a window
+            return np.full(len(self.now), np.nan)
+        return count_strayed(self.position_m, self.range_m, self.is_active)
 
 
 Value = TypeVar("Value")  # one number a mission
@@ -86,6 +90,13 @@ class Column(Generic[Value]):
     start: float = 0.0  # before the first window
     add: Add = np.add
     divisor: Callable[[int], int] = lambda _num_windows: 1  # of the sum, by the mission's length
+
+
+@dataclass(frozen=True, kw_only=True)
+class VarianceColumn(Generic[Value]):
+    """How one number of missions is made of the whole course of their velocity variance."""
+
+    of_course: Callable[[Float[np.ndarray, "T B"]], Value]  # [m²/s²], a row for each window
 
 
 def _latest(_before: np.ndarray, term: np.ndarray) -> np.ndarray:
@@ -118,9 +129,8 @@ def _first(term: Callable[[Moment], Value]) -> Value:
     return field(metadata={"column": Column(term=term, start=np.nan, add=np.fmin)})
 
 
-def _since(term: Callable[[Moment], Value]) -> Value:
-    """Return a column of the first of the latest terms without nan between them."""
-    return field(metadata={"column": Column(term=term, start=np.nan, add=agreed_since)})
+def _of_variance(of_course: Callable[[Float[np.ndarray, "T B"]], Value]) -> Value:
+    return field(metadata={"column": VarianceColumn(of_course=of_course)})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -149,7 +159,11 @@ class BatchCosts:
     # Everyone had first heard of everyone [windows]; nan: never.
     complete_window: Float[np.ndarray, "B"] = _first(lambda at: at.completed_at)
     # The flock agreed from then on, to the end [windows]; nan: it did not.
-    agreed_window: Float[np.ndarray, "B"] = _since(lambda at: at.agreed_at)
+    agreed_window: Float[np.ndarray, "B"] = _of_variance(agreed_window)
+    # How fast the velocity variance falls at first [1/window]; nan: it does not fall so far.
+    decay_rate: Float[np.ndarray, "B"] = _of_variance(lambda variance: decay(variance).rate)
+    # Robots out of everyone's range at the end.
+    strayed: Float[np.ndarray, "B"] = _last(lambda at: at.strayed)
     # Requests or broadcasts.
     packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.packets.sent)
     # All that were on the air, responses too.
@@ -175,7 +189,7 @@ class BatchCosts:
         raise ValueError(f"missions have no cost {cost.column}")
 
 
-COLUMNS: dict[str, Column[np.ndarray]] = {
+COLUMNS: dict[str, Column[np.ndarray] | VarianceColumn[np.ndarray]] = {
     spec.name: spec.metadata["column"] for spec in fields(BatchCosts) if "column" in spec.metadata
 }
 """The costs of each mission by their names: all but `ages`, which counts over all missions."""
@@ -189,28 +203,41 @@ def fly_batch(batch: Batch) -> BatchCosts:
     an unknown policy, one that has changed, or a bad seed; and if no connected team could be drawn,
     or a part of the user's own raised.
     """
+    swarm, flown = start_batch(batch)
+    return costs_of(swarm, flown)
+
+
+def start_batch(batch: Batch) -> tuple[Swarm, Iterator[WindowRecord]]:
+    """Return a batch's missions, and their flight window by window; raises as `fly_batch` does."""
     swarm = Swarm(batch.mission, batch.seeds, **batch.components.given)
     policy = make_policy_with(batch.arguments, batch.policy, batch.mission)
     if batch.parameters is not None and policy.parameters != batch.parameters:
         raise ValueError(
             f"policy {batch.policy} has changed since the evaluation began; evaluate a copy of it"
         )
-    return costs_of(swarm, rollout(swarm, policy))
+    return swarm, rollout(swarm, policy)
 
 
 def costs_of(swarm: Swarm, flown: Iterable[WindowRecord]) -> BatchCosts:
     """Add up what missions cost, window by window: however many fly, the sums round alike."""
     num_windows = swarm.mission.num_windows
     num_missions = len(swarm.now)
-    sums = {name: np.full(num_missions, column.start) for name, column in COLUMNS.items()}
+    folded = {name: column for name, column in COLUMNS.items() if isinstance(column, Column)}
+    sums = {name: np.full(num_missions, column.start) for name, column in folded.items()}
     ages = np.zeros(round(num_windows / SLOT_WINDOWS) + 1, dtype=np.int64)
+    variance: list[np.ndarray] = []
     for at in _moments(swarm, flown):
-        for name, column in COLUMNS.items():
+        for name, column in folded.items():
             sums[name] = column.add(sums[name], column.term(at))
         count_ages(at.timestamp, at.now, ages, at.is_active)
+        variance.append(at.costs.velocity_variance_m2ps2)
+    course = np.stack(variance)
     costs: dict[str, np.ndarray] = {}
     for name, column in COLUMNS.items():
-        costs[name] = _finite(sums[name] / column.divisor(num_windows))
+        if isinstance(column, Column):
+            costs[name] = _finite(sums[name] / column.divisor(num_windows))
+        else:
+            costs[name] = column.of_course(course)
     return BatchCosts(**costs, ages=ages)
 
 
@@ -223,10 +250,7 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
     has_floor = isinstance(swarm.channel, FreeSpaceRadio) and swarm.channel == radio_of(mission)
     shared = np.full_like(swarm.buffers.timestamp, NEVER)
     floor = np.full(num_missions, np.nan)
-    first_variance = None
     for window in flown:
-        if first_variance is None:
-            first_variance = window.costs.velocity_variance_m2ps2
         states = swarm.states
         now = swarm.now
         # Always an array, so that the loops below are compiled for one kind of arguments.
@@ -241,8 +265,10 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
             timestamp=swarm.buffers.timestamp,
             now=now,
             is_active=is_active,
+            position_m=states.position_m,
+            range_m=mission.range_m,
             is_steady=bool(now[0] > num_early),
-            first_variance_m2ps2=first_variance,
+            is_last=bool(now[0] >= mission.num_windows),
             floor=floor,
         )
 

@@ -12,7 +12,7 @@ from jaxtyping import Float
 
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.published import Point, published
-from swarm_mj.evaluation.samples import Sample, quantile_of_counts
+from swarm_mj.evaluation.samples import Interval, Sample, quantile_of_counts, share_interval
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
@@ -167,10 +167,37 @@ class Measurements:
         """
         return np.nan_to_num(self.costs.complete_window, nan=np.inf)
 
+    # How flocks agree; there is nothing of robots that do not flock.
+
+    def _of_flocks(self, numbers: Float[np.ndarray, "B"]) -> Float[np.ndarray, "n"]:
+        return numbers if self.mission.flocks else np.empty(0)
+
     @property
-    def agreed(self) -> Float[np.ndarray, "B"]:
-        """The windows from which on flocks had agreed; one that did not counts as late as any."""
-        return np.nan_to_num(self.costs.agreed_window, nan=np.inf)
+    def agreed_window_median(self) -> float:
+        """The median window from which on flocks had agreed; one that did not is later than all."""
+        windows = np.nan_to_num(self.costs.agreed_window, nan=np.inf)
+        return Sample(self._of_flocks(windows)).median
+
+    @property
+    def agreed_share(self) -> float:
+        """The share of missions whose flock had agreed at the end."""
+        return Sample(self._of_flocks(np.isfinite(self.costs.agreed_window).astype(float))).mean
+
+    @property
+    def agreed_share_interval(self) -> Interval:
+        """That share's interval of 95 %."""
+        return share_interval(self._of_flocks(np.isfinite(self.costs.agreed_window)))
+
+    @property
+    def decay_rate(self) -> Sample:
+        """The rates at which velocity variances fell [1/window]; not of those that never did."""
+        rate = self._of_flocks(self.costs.decay_rate)
+        return Sample(rate[np.isfinite(rate)])
+
+    @property
+    def strayed(self) -> Sample:
+        """The robots of each mission that were out of everyone's range at its end."""
+        return Sample(self._of_flocks(self.costs.strayed))
 
     # The paper's own.
 

@@ -13,7 +13,7 @@ import pandas as pd
 import pyarrow as pa
 from pyarrow import parquet
 
-from swarm_mj.evaluation.results import Evaluated, config_of
+from swarm_mj.evaluation.results import CONVERGENCE, Evaluated, config_of
 from swarm_mj.evaluation.samples import bootstrap_interval
 from swarm_mj.evaluation.study import MAX_MISSIONS
 from swarm_mj.mission import Mission
@@ -36,10 +36,11 @@ IS_KIND: dict[object, Callable[[pa.DataType], bool]] = {
 }
 DEFAULTS = {spec.name: spec.default for spec in fields(Mission)}
 OPTIONAL = [spec.name for spec in fields(Mission) if NoneType in get_args(spec.type)]
-MAY_LACK = {*COSTS, *CALLED_WITH, *OPTIONAL}  # the columns that a mission may have no value of
+NUMBERS = [*COSTS, *CONVERGENCE]  # of a mission
+MAY_LACK = {*NUMBERS, *CALLED_WITH, *OPTIONAL}  # the columns that a mission may have no value of
 KEYS = ["policy", *REGIME, "seed"]  # which tell missions apart
 MAX_ROWS = MAX_MISSIONS  # of a file
-COLUMNS = {"policy": str, "seed": int} | dict.fromkeys(COSTS, float) | REGIME
+COLUMNS = {"policy": str, "seed": int} | dict.fromkeys(NUMBERS, float) | REGIME
 
 
 def write_missions(path: Path, evaluated: Sequence[Evaluated]) -> None:
@@ -67,8 +68,8 @@ def write_missions(path: Path, evaluated: Sequence[Evaluated]) -> None:
         regime = config_of(each.result) | {"policy": each.result.policy}
         for index in range(len(each.aoi)):
             row = regime | {"seed": each.result.seed + index}
-            for name, costs in each.costs.items():
-                row[name] = costs[index]
+            for name, values in each.numbers.items():
+                row[name] = values[index]
             rows.append(row)
     table = pa.Table.from_pylist(rows, pa.schema(columns, {"study": json.dumps(study)}))
     content = pa.BufferOutputStream()
@@ -128,6 +129,8 @@ def _in_columns(file: parquet.ParquetFile) -> pa.Table:
         elif name in DEFAULTS:
             default = pa.array([DEFAULTS[name]] * num_missions, KINDS[kind])
             columns.append(pa.chunked_array([default]))
+        elif name in CONVERGENCE:  # files of before 1.1 lack it
+            columns.append(pa.chunked_array([pa.nulls(num_missions, KINDS[kind])]))
         else:
             raise ValueError(f"it has no column {name}")
     return pa.table(columns, names=list(COLUMNS))
@@ -141,7 +144,7 @@ def _column(name: str, kind: object, found: pa.ChunkedArray) -> pa.ChunkedArray:
     if not is_kind:
         raise ValueError(f"column {name} must hold {KINDS[kind]}, not {found.type!s:.80}")
     column = found.cast(KINDS[kind])
-    if name in COSTS and np.isinf(column.to_numpy()).any():
+    if name in NUMBERS and np.isinf(column.to_numpy()).any():
         raise ValueError(f"column {name} holds an infinite number, which has no mean")
     return column
 

@@ -125,13 +125,23 @@ class Result:
     # Flocks: when under 1 % of the first velocity variance was left, to the end, over all missions;
     # None if half never came so far, or for robots that do not flock.
     agreed_window_median: float | None = later_column(
-        lambda own: float(np.median(own.agreed)) if own.mission.flocks else None, older=None
+        lambda own: own.agreed_window_median, older=None
     )
-    # Of missions in which it was.
-    agreed_share: float | None = later_column(
-        lambda own: float(np.mean(np.isfinite(own.agreed))) if own.mission.flocks else None,
-        older=None,
+    # Of missions in which it was, with the share's interval of 95 % (Wilson).
+    agreed_share: float | None = later_column(lambda own: own.agreed_share, older=None)
+    agreed_share_ci_low: float | None = later_column(
+        lambda own: own.agreed_share_interval.low, older=None
     )
+    agreed_share_ci_high: float | None = later_column(
+        lambda own: own.agreed_share_interval.high, older=None
+    )
+    # Flocks: how fast velocity variance falls over its first three e-foldings [1/window], over the
+    # missions in which it does.
+    decay_rate_mean: float | None = later_column(lambda own: own.decay_rate.mean, older=None)
+    decay_rate_sem: float | None = later_column(lambda own: own.decay_rate.sem, older=None)
+    # Flocks: robots of a mission that are out of everyone's range at its end.
+    strayed_mean: float | None = later_column(lambda own: own.strayed.mean, older=None)
+    strayed_worst: float | None = later_column(lambda own: own.strayed.worst, older=None)
 
     # Differences are this policy's minus the baseline's, on the same missions.
     baseline: str = column(lambda own: own.baseline)
@@ -198,6 +208,9 @@ def result_of(measured: Measurements) -> Result:
     return Result(**cells)
 
 
+CONVERGENCE = ("agreed_window", "decay_rate", "strayed")  # the fields of `Evaluated` of flocks
+
+
 @dataclass(frozen=True, kw_only=True)
 class Evaluated:
     """A result and its missions, in the order of their seeds."""
@@ -206,6 +219,10 @@ class Evaluated:
     aoi: list[float]  # age of information, mean over windows [windows]
     velocity_variance: list[float]  # mean over windows [m²/s²]
     task_cost: list[float] | None  # mean over windows; None if the controller has none
+    # Of flocks; None where a mission has no such number.
+    agreed_window: list[float | None] | None = None  # from then on they had agreed
+    decay_rate: list[float | None] | None = None  # of the velocity variance [1/window]
+    strayed: list[float | None] | None = None  # robots out of everyone's range at the end
 
     @property
     def costs(self) -> dict[str, list[float]]:
@@ -216,9 +233,21 @@ class Evaluated:
         return costs
 
     @property
+    def numbers(self) -> dict[str, list[float | None]]:
+        """Each mission's costs and, of flocks, how it came to agree, by their columns."""
+        numbers: dict[str, list[float | None]] = {}
+        for name, values in self.costs.items():
+            numbers[name] = list(values)
+        for name in CONVERGENCE:
+            values = getattr(self, name)
+            if values is not None:
+                numbers[name] = values
+        return numbers
+
+    @property
     def row(self) -> dict[str, Any]:
-        """The result's columns, and the missions' costs as lists."""
-        missions = {f"episode_{name}": each for name, each in self.costs.items()}
+        """The result's columns, and the missions' numbers as lists."""
+        missions = {f"episode_{name}": each for name, each in self.numbers.items()}
         return asdict(self.result) | missions
 
 

@@ -1,4 +1,4 @@
-"""Statistics of independent samples: mean, errors, quantiles, and the mean's interval of 95 %."""
+"""Statistics of independent samples: mean, errors, quantiles, and intervals of 95 %."""
 
 import math
 from dataclasses import dataclass
@@ -6,14 +6,15 @@ from functools import cached_property
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, Shaped
 
 BATCH = 1000  # resamples at once: bounds the memory that many samples take
+NORMAL_95 = 1.959964  # standard deviations about the mean that hold 95 % of a normal distribution
 ROUNDING = 1e-12  # samples that differ by no more than this share of their size are constant
 
 
 class Interval(NamedTuple):
-    """Both ends of a mean's interval of 95 %; None where there is none."""
+    """Both ends of an interval of 95 %, of a mean or a share; None where there is none."""
 
     low: float | None
     high: float | None
@@ -88,6 +89,24 @@ def bootstrap_interval(samples: Float[np.ndarray, "n"]) -> Interval:
     rng = np.random.default_rng(0)  # the same samples always have the same interval
     found = bootstrap((samples,), np.mean, batch=BATCH, rng=rng).confidence_interval
     return Interval(float(found.low), float(found.high))
+
+
+def share_interval(holds: Shaped[np.ndarray, "n"]) -> Interval:
+    """Return the interval of 95 % of a share of missions (Wilson 1927); None without missions.
+
+    Args:
+        holds: Whether what is counted holds in each mission, [n].
+    """
+    n = holds.size
+    if n == 0:
+        return Interval(None, None)
+    share = float(np.mean(holds))
+    # The share and one half, weighed by the missions and by what stands for the prior doubt.
+    weight = n / (n + NORMAL_95**2)
+    centre = weight * share + (1.0 - weight) / 2.0
+    spread = share * (1.0 - share) / n + NORMAL_95**2 / (4.0 * n**2)
+    half = weight * NORMAL_95 * math.sqrt(spread)
+    return Interval(max(0.0, centre - half), min(1.0, centre + half))
 
 
 def quantile_of_counts(counts: Int[np.ndarray, "bins"], share: float) -> int:

@@ -1,14 +1,16 @@
 """Results of a study from its batches' costs: one per policy and regime, and files of them."""
 
+import math
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from swarm_mj.evaluation.batch import BatchCosts, merge
 from swarm_mj.evaluation.measurements import Measurements
-from swarm_mj.evaluation.results import Evaluated, result_of
+from swarm_mj.evaluation.results import CONVERGENCE, Evaluated, result_of
 from swarm_mj.evaluation.results_files import write_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
@@ -45,15 +47,24 @@ def study_results(
             commit=made_by["commit"],
         )
         has_task_cost = not np.isnan(own.task_cost).any()
+        of_flocks: dict[str, list[float | None]] = {}
+        if regime.flocks:
+            of_flocks = {name: _numbers(getattr(own, name)) for name in CONVERGENCE}
         evaluated.append(
             Evaluated(
                 result=result_of(measured),
                 aoi=own.aoi.tolist(),
                 velocity_variance=own.velocity_variance.tolist(),
                 task_cost=own.task_cost.tolist() if has_task_cost else None,
+                **of_flocks,
             )
         )
     return evaluated
+
+
+def _numbers(values: Float[np.ndarray, "B"]) -> list[float | None]:
+    """Return a number of each mission; None in place of nan."""
+    return [None if math.isnan(value) else value for value in values.tolist()]
 
 
 def write_evaluated(path: Path, evaluated: Sequence[Evaluated]) -> None:

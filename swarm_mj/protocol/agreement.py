@@ -1,48 +1,96 @@
-"""When a flock has agreed on a velocity: hardly any velocity variance is left, for good."""
+"""When a flock has agreed on a velocity, for good, and how fast it comes to that.
 
-from collections.abc import Sequence
+A *course* is a cost of missions after each window, [T B]: window 1 is its first row.
+"""
+
+import math
+from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Float
 
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
+E_FOLDINGS = 3  # of the velocity variance, from the first window on, over which a decay is measured
+
+Course = Float[np.ndarray, "T B"]
 
 
-def has_agreed(
-    variance_m2ps2: Float[np.ndarray, "B"], first_m2ps2: Float[np.ndarray, "B"]
-) -> Bool[np.ndarray, "B"]:
-    """Return whether a window's velocity variance is under 1 % of the first window's.
+def settled_window(course: Course, limit: float | Float[np.ndarray, "B"]) -> Float[np.ndarray, "B"]:
+    """Return the first window from which on each mission's cost is below a limit, to the end.
 
     Args:
-        variance_m2ps2: After the window, of each mission (IV-A) [m²/s²].
-        first_m2ps2: After the first window [m²/s²]; robots at rest, with 0, never agree.
+        course: The cost after each window, at least one; what is no number is not below.
+        limit: In the cost's unit, of all missions or of each.
+
+    Returns:
+        Windows, counted from 1; nan where the cost is not below the limit at the end.
     """
-    return variance_m2ps2 < AGREED * first_m2ps2
+    num_windows = len(course)
+    is_over = ~(course < limit)
+    last_over = num_windows - np.argmax(is_over[::-1], axis=0)  # counted from 1
+    settled = np.where(np.any(is_over, axis=0), last_over + 1.0, 1.0)
+    return np.where(settled <= num_windows, settled, np.nan)
 
 
-def agreed_window(variance_m2ps2: Sequence[Float[np.ndarray, "B"]]) -> Float[np.ndarray, "B"]:
+def agreed_window(variance_m2ps2: Course) -> Float[np.ndarray, "B"]:
     """Return the first window from which on each mission's flock has agreed, to the end.
 
     Args:
-        variance_m2ps2: After each window, in order, at least one [m²/s²].
+        variance_m2ps2: Velocity variance after each window, at least one [m²/s²].
 
     Returns:
-        Windows, counted from 1; nan where the flock has not agreed at the end.
+        Windows, counted from 1; nan where the flock has not agreed at the end, and of robots at
+        rest.
     """
-    since = np.full(len(variance_m2ps2[0]), np.nan)
-    for window, variance in enumerate(variance_m2ps2, start=1):
-        has = has_agreed(variance, variance_m2ps2[0])
-        since = agreed_since(since, np.where(has, float(window), np.nan))
-    return since
+    return settled_window(variance_m2ps2, AGREED * variance_m2ps2[0])
 
 
-def agreed_since(
-    before: Float[np.ndarray, "B"], window: Float[np.ndarray, "B"]
-) -> Float[np.ndarray, "B"]:
-    """Return since when flocks have agreed, after another window.
+class Decay(NamedTuple):
+    """How fast a flock's velocity variance falls: as exp(-rate t)."""
+
+    rate: Float[np.ndarray, "B"]  # [1/window]
+    error: Float[np.ndarray, "B"]  # the rate's standard error [1/window]
+
+
+def perfect_rate(window_s: float) -> float:
+    """Return how fast a flock's velocity variance falls that knows itself perfectly [1/window].
+
+    The differences to the mean velocity shrink by 1 - Δt in each window (Eqs. 15 and 16).
+    """
+    return -2.0 * math.log(1.0 - window_s)
+
+
+def decay(variance_m2ps2: Course) -> Decay:
+    """Return how fast each mission's velocity variance falls, over its first three e-foldings.
+
+    A line is fitted to the logarithm from the first window to the first in which under 5 %, which
+    is exp(-3), of the first variance is left. With perfect knowledge it falls at `perfect_rate`.
 
     Args:
-        before: Since when they had, after the windows before; nan if they had not.
-        window: The window's number where they have agreed in it, nan elsewhere.
+        variance_m2ps2: Velocity variance after each window, at least one [m²/s²].
+
+    Returns:
+        The rate, and its standard error; both are nan where less than three windows lead so far,
+        or none does.
     """
-    return np.where(np.isnan(before) | np.isnan(window), window, before)
+    num_missions = variance_m2ps2.shape[1]
+    rate = np.full(num_missions, np.nan)
+    error = np.full(num_missions, np.nan)
+    for b in range(num_missions):
+        variance = variance_m2ps2[:, b]
+        is_past = variance < math.exp(-E_FOLDINGS) * variance[0]
+        last = int(np.argmax(is_past))
+        fallen = variance[: last + 1]
+        if last >= 2 and np.all(fallen > 0.0):  # two windows leave no error; 0 has no logarithm
+            rate[b], error[b] = _slope(np.log(fallen))
+    return Decay(rate=-rate, error=error)
+
+
+def _slope(values: Float[np.ndarray, "n"]) -> tuple[float, float]:
+    """Return the slope of values over their places, by least squares, and its standard error."""
+    place = np.arange(len(values)) - (len(values) - 1) / 2.0
+    spread = float(np.sum(place**2))
+    slope = float(np.sum(place * values)) / spread
+    residual = values - np.mean(values) - slope * place
+    error = math.sqrt(float(np.sum(residual**2)) / (len(values) - 2) / spread)
+    return slope, error

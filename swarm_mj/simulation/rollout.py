@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.policies.policy import Policy
-from swarm_mj.protocol.agreement import agreed_window
+from swarm_mj.protocol.agreement import agreed_window, decay
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, mean_hops
 from swarm_mj.protocol.packet_counts import Packets
 from swarm_mj.simulation.swarm import Swarm
@@ -53,6 +53,9 @@ class FlownCosts(Generic[Mean, Count, SomeMean, SomeCount]):
     complete_window: SomeCount  # after which everyone had heard of everyone, if ever
     # The first from which on under 1 % of the first velocity variance is left, to the end, if any.
     agreed_window: SomeCount
+    # How fast the velocity variance falls over its first three e-foldings, if it does [1/window].
+    decay_rate: SomeMean
+    decay_rate_error: SomeMean  # the rate's standard error
     packets_sent: Count  # requests or broadcasts
     packets_transmitted: Count  # all that were on the air, responses too
     packets_attempted: SomeCount  # requests
@@ -120,6 +123,7 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
     if not flown:
         raise ValueError("a summary needs at least 1 window flown, not 0")
     variance = [window.costs.velocity_variance_m2ps2 for window in flown]
+    fall = decay(np.stack(variance))
     is_complete = np.stack([window.costs.is_complete for window in flown])
     first_complete = np.argmax(is_complete, axis=0) + 1.0
     packets = _total_packets([window.costs.packets for window in flown])
@@ -138,7 +142,9 @@ def summarise(flown: Iterable[WindowRecord]) -> Summary:
         task_cost_last=task.last if task else None,
         hops_mean=_mean([window.hops for window in flown]),
         complete_window=np.where(np.any(is_complete, axis=0), first_complete, np.nan),
-        agreed_window=agreed_window(variance),
+        agreed_window=agreed_window(np.stack(variance)),
+        decay_rate=fall.rate,
+        decay_rate_error=fall.error,
         packets_sent=packets.sent,
         packets_transmitted=packets.transmitted,
         packets_attempted=packets.attempted,

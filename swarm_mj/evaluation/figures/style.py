@@ -11,7 +11,9 @@ from dataclasses import replace
 from pathlib import Path
 from typing import cast
 
+import matplotlib.pyplot as plt
 import matplotlib.style
+from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.text import Text
 
@@ -21,6 +23,7 @@ from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.writing import write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
+TITLE_PT = 10.0
 FAINT = "#666666"
 # The field that has a format's caption, and those that would say when the file was made.
 METADATA = {
@@ -85,6 +88,22 @@ def escape_mathtext(text: str) -> str:
 def styled() -> AbstractContextManager[None]:
     """Apply this style within a context, regardless of the user's settings."""
     return matplotlib.style.context(["default", "swarm_mj.evaluation.figures.paper"])
+
+
+def panels(title: str, *, rows: int, height_in: float) -> tuple[Figure, list[Axes]]:
+    """Return a titled figure of panels below each other, over one x."""
+    figure = plt.figure(figsize=(WIDTH_IN, height_in), layout="constrained")
+    axes = figure.subplots(rows, 1, sharex="col", squeeze=False)
+    figure.suptitle(escape_mathtext(title), x=0.01, ha="left", fontsize=TITLE_PT)
+    return figure, list(axes.flat)
+
+
+def kept(figure: Figure) -> Figure:
+    """Return a figure as a function hands it back, in a notebook too."""
+    # A notebook shows a figure twice if it is open and a cell's result.
+    if "inline" in str(plt.get_backend()):
+        plt.close(figure)
+    return figure
 
 
 def write_caption(figure: Figure, text: str, x: float = 0.01, y: float | None = None) -> None:
