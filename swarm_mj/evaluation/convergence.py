@@ -225,6 +225,7 @@ def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergenc
     """
     [(mission, policy)] = study.pairs
     cost = _checked_cost(study, mission, goal)
+    _check_time(mission, goal)
     flights = [Flight(batch=batch, below=goal.below) for batch in study.batches]
     early: dict[int, np.ndarray] = {}  # done before others of lower seeds
     in_order: list[np.ndarray] = []
@@ -273,8 +274,8 @@ def fly_to_convergence(flight: Flight) -> Float[np.ndarray, "B"]:
     return settled_window(np.stack(course), flight.below)
 
 
-def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
-    """Return the cost that has to converge, in words; raise ValueError if there is none."""
+def _check_time(mission: Mission, goal: Goal) -> None:
+    """Raise ValueError if missions end before they are to have converged."""
     flown_s = mission.num_windows * mission.window_s
     if goal.within_s > flown_s:
         needed = math.ceil(goal.within_s / mission.window_s)
@@ -282,6 +283,10 @@ def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
             f"within {goal.within_s:g} s is after the missions' end at {flown_s:g} s; fly at least "
             f"{needed} windows, or choose an earlier time"
         )
+
+
+def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
+    """Return the cost that has to converge, in words; raise ValueError if there is none."""
     its = study.task_cost(mission)
     if goal.below is None:
         if mission.flocks and (its is None or its[0] == Flocking.cost_name):

@@ -8,7 +8,7 @@ from functools import cached_property
 from typing import Any, TypeVar
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Shaped
 
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.published import Point, published
@@ -169,7 +169,7 @@ class Measurements:
 
     # How flocks agree; there is nothing of robots that do not flock.
 
-    def _of_flocks(self, numbers: Float[np.ndarray, "B"]) -> Float[np.ndarray, "n"]:
+    def _of_flocks(self, numbers: Shaped[np.ndarray, "B"]) -> Shaped[np.ndarray, "n"]:
         return numbers if self.mission.flocks else np.empty(0)
 
     @property

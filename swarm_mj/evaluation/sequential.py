@@ -8,8 +8,7 @@ from typing import NamedTuple
 
 import numpy as np
 from scipy.optimize import root_scalar
-from scipy.special import betaln
-from scipy.stats import beta
+from scipy.special import betaincc, betaln
 
 
 class ShareBounds(NamedTuple):
@@ -73,7 +72,8 @@ def log_evidence(num_held: int, num_failed: int, share: float) -> float:
         num_failed: All others.
         share: Above 0, below 1.
     """
-    after = beta(num_held + 1, num_failed + 1)  # of a share, all of which were alike before
-    mixed = betaln(num_held + 1, num_failed + 1) + after.logsf(share) - np.log1p(-share)
+    # All shares were alike before; this is how likely those above `share` are after the missions.
+    above = betaincc(num_held + 1, num_failed + 1, share)
+    mixed = betaln(num_held + 1, num_failed + 1) + np.log(above) - np.log1p(-share)
     own = num_held * np.log(share) + num_failed * np.log1p(-share)
     return float(mixed - own)

@@ -29,8 +29,21 @@ def test_a_flight_is_drawn_window_by_window():
     assert list(worst.get_ydata()) == list(run.log.age_max)
     assert list(variance.lines[0].get_xdata()) == list(range(1, 21))
     assert variance.get_yscale() == "log"
+    assert variance.lines[1].get_ydata()[0] == 0.01 * run.summary.velocity_variance_first
+    assert len(variance.lines) == 2  # it does not agree in 20 windows
+    assert not variance.texts
     assert age.get_shared_x_axes().joined(age, variance)
     assert tuple(age.figure.get_size_inches()) == pytest.approx((7.5, 1.1 + 2 * 2.1))
+
+
+def test_a_flock_that_agreed_has_a_mark_and_what_is_not_shown_is_said():
+    run = swarm_mj.fly("flocking", policy="tdma", num_robots=10, num_windows=200, record=False)
+    variance = run.plot().axes[1]
+    assert set(variance.lines[2].get_xdata()) == {run.summary.agreed_window}
+    assert variance.lines[2].get_label() == f"agreed from window {run.summary.agreed_window} on"
+    course = run.to_dataframe().velocity_variance
+    assert (course.min() < 1e-6 * course.max()) == bool(variance.texts)
+    assert variance.get_ylim()[0] >= 0.5e-6 * course.max()
 
 
 def test_a_random_walk_has_no_velocity_variance_below_its_age():

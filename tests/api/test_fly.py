@@ -93,6 +93,15 @@ def test_the_share_heard_is_that_of_the_pairs_of_active_robots(failure_fraction)
     assert flown.summary.heard_share == pytest.approx(np.mean(heard))
 
 
+def test_robots_out_of_everyone_s_range_at_the_end_are_counted():
+    """Who hears nothing keeps the velocity that it began with."""
+    mission = paper("flocking", num_robots=4, num_windows=3000, range_ratio=0.2)
+    talking = swarm_mj.fly(mission, policy="tdma", record=False)
+    assert talking.summary.strayed == 0
+    silent = swarm_mj.fly(mission, policy="aloha", probability=0.0, record=False)
+    assert silent.summary.strayed == 4
+
+
 @pytest.mark.slow
 def test_numpys_numbers_can_be_saved(here):
     """In a Python without the tests' checks of types, which admit Python's numbers only."""

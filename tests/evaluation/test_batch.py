@@ -44,6 +44,16 @@ def floor_of(swarm, known):
     return connectivity_floor(known, position_m, range_m, swarm.now, active(swarm))
 
 
+def strayed_by_hand(swarm):
+    """The robots that are on, and more than the range away from all others that are on."""
+    found = []
+    for position_m, is_on in zip(swarm.states.position_m, active(swarm), strict=True):
+        apart_m = np.linalg.norm(position_m[:, None] - position_m, axis=2)
+        is_near = (apart_m <= swarm.mission.range_m) & is_on & ~np.eye(len(is_on), dtype=bool)
+        found.append(np.sum(is_on & ~is_near.any(axis=1)))
+    return found
+
+
 @pytest.mark.parametrize("failure_fraction", [0.0, 0.5])
 @pytest.mark.parametrize("policy", ["mst", "random-flooding"])
 def test_costs_are_those_of_the_flight(policy, failure_fraction):
@@ -66,6 +76,8 @@ def test_costs_are_those_of_the_flight(policy, failure_fraction):
         np.testing.assert_allclose(getattr(costs, f"packets_{name}"), expected)
     np.testing.assert_array_equal(costs.complete_window, summary.complete_window)
     np.testing.assert_array_equal(costs.agreed_window, summary.agreed_window)
+    np.testing.assert_array_equal(costs.decay_rate, summary.decay_rate)
+    assert costs.strayed.tolist() == strayed_by_hand(swarm)
     steady = [window.costs.age_windows for window in flown[15:]]  # the later 16 of 31
     np.testing.assert_allclose(costs.aoi_steady, np.mean(steady, axis=0))
     np.testing.assert_allclose(costs.aoi_floor, np.mean(floors, axis=0))

@@ -9,6 +9,7 @@ import pytest
 
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.measurements import Measurements
+from swarm_mj.evaluation.samples import share_interval
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import paper
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE
@@ -30,6 +31,8 @@ def costs(aoi, **overrides):
         "task_cost_last": NONE,
         "complete_window": NONE,
         "agreed_window": NONE,
+        "decay_rate": NONE,
+        "strayed": np.zeros(3),
         "packets_sent": np.zeros(3),
         "packets_transmitted": np.zeros(3),
         "packets_delivered": NONE,
@@ -124,9 +127,33 @@ def test_no_share_of_no_packets():
 
 def test_a_mission_that_never_was_complete_is_later_than_any():
     windows = [3.0, math.nan, 2.0]
-    found = measured(costs([0.0] * 3, complete_window=windows, agreed_window=windows))
-    np.testing.assert_array_equal(found.agreed, [3.0, math.inf, 2.0])
+    found = measured(costs([0.0] * 3, complete_window=windows))
     assert found.complete.tolist() == [3.0, math.inf, 2.0]
+
+
+FLOCKS = paper("flocking", num_windows=4)
+
+
+def test_how_flocks_agree_is_measured_over_missions_that_did_not_too():
+    windows = [3.0, math.nan, 2.0]
+    own = costs(
+        [0.0] * 3, agreed_window=windows, decay_rate=[0.1, math.nan, 0.2], strayed=[0, 2, 1]
+    )
+    found = measured(own, mission=FLOCKS)
+    assert found.agreed_window_median == 3.0
+    assert found.agreed_share == pytest.approx(2.0 / 3.0)
+    assert found.agreed_share_interval == share_interval(np.array([True, False, True]))
+    assert found.decay_rate.mean == pytest.approx(0.15)
+    assert (found.strayed.mean, found.strayed.worst) == (1.0, 2.0)
+
+
+def test_robots_that_do_not_flock_do_not_agree_either():
+    found = measured(costs([0.0] * 3, agreed_window=[1.0] * 3, strayed=np.ones(3)))
+    assert math.isnan(found.agreed_window_median)
+    assert math.isnan(found.agreed_share)
+    assert found.agreed_share_interval == (None, None)
+    assert math.isnan(found.decay_rate.mean)
+    assert math.isnan(found.strayed.mean)
 
 
 def test_the_policy_and_its_options_are_those_of_the_study():

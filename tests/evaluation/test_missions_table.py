@@ -12,6 +12,7 @@ from pyarrow import parquet
 
 import swarm_mj
 from swarm_mj.evaluation.missions_table import compared, read_missions, write_missions
+from swarm_mj.evaluation.results import CONVERGENCE
 from swarm_mj.mission import Mission, paper
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
 from swarm_mj.simulation.components import CALLED_WITH
@@ -32,6 +33,7 @@ def written(flown, tmp_path):
     def write(name, ages, seed=5, **fields):
         result = replace(flown[0].result, seed=seed, config=json.dumps(asdict(MISSION) | fields))
         own = replace(flown[0], result=result, aoi=ages, velocity_variance=ages, task_cost=None)
+        own = replace(own, agreed_window=None, decay_rate=None, strayed=None)
         write_missions(tmp_path / name, [own])
         return tmp_path / name
 
@@ -48,6 +50,9 @@ def test_a_file_has_a_row_for_each_mission_with_its_fields_and_the_study(flown, 
     assert list(rows["aoi"]) == mst.aoi + tdma.aoi
     assert list(rows["velocity_variance"]) == mst.velocity_variance + tdma.velocity_variance
     assert list(rows["task_cost"]) == mst.task_cost + tdma.task_cost
+    for name in CONVERGENCE:
+        told = rows[name].astype(object).where(rows[name].notna(), None)
+        assert list(told) == getattr(mst, name) + getattr(tdma, name)
     for spec in fields(Mission):
         (value,) = set(rows[spec.name].astype(object).where(rows[spec.name].notna(), None))
         assert value == getattr(MISSION, spec.name), spec.name
@@ -56,6 +61,12 @@ def test_a_file_has_a_row_for_each_mission_with_its_fields_and_the_study(flown, 
     assert study["version"] == flown[0].result.version
     assert study["policies and regimes"] == [json.loads(each.result.config) for each in flown]
     assert read_missions(path).equals(rows)
+
+
+def test_files_of_before_flocks_said_how_they_agree_are_read(written, tmp_path):
+    table = parquet.read_table(written("m.parquet", [1.0, 2.0]))
+    parquet.write_table(table.drop_columns(list(CONVERGENCE)), tmp_path / "old.parquet")
+    assert read_missions(tmp_path / "old.parquet")[list(CONVERGENCE)].isna().all(axis=None)
 
 
 def test_columns_have_kinds_even_where_no_mission_has_a_value(written):

@@ -6,7 +6,12 @@ import numpy as np
 import pytest
 import scipy.stats
 
-from swarm_mj.evaluation.samples import Sample, bootstrap_interval, quantile_of_counts
+from swarm_mj.evaluation.samples import (
+    Sample,
+    bootstrap_interval,
+    quantile_of_counts,
+    share_interval,
+)
 
 
 def test_the_interval_is_near_a_plain_bootstraps_and_students():
@@ -63,3 +68,13 @@ def test_without_samples_there_is_nothing():
 )
 def test_quantile_of_counts_by_hand(counts, share, expected):
     assert quantile_of_counts(np.array(counts), share) == expected
+
+
+def test_a_share_s_interval_is_wilson_s():
+    """By scipy's own; none held is no proof that none will."""
+    for num_held, n in ((0, 10), (3, 10), (96, 100), (5, 5)):
+        holds = np.arange(n) < num_held
+        expected = scipy.stats.binomtest(num_held, n).proportion_ci(method="wilson")
+        found = share_interval(holds)
+        assert found == pytest.approx((expected.low, expected.high), rel=1e-6)
+    assert share_interval(np.empty(0, dtype=bool)) == (None, None)

@@ -37,6 +37,8 @@ def costs(aoi, **overrides):
         "task_cost_last": [None] * n,
         "complete_window": [None] * n,
         "agreed_window": [None] * n,
+        "decay_rate": [None] * n,
+        "strayed": [0.0] * n,
         "packets_sent": [1000] * n,
         "packets_transmitted": [1500] * n,
         "packets_delivered": [250] * n,

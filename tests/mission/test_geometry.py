@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 from scipy.sparse.csgraph import minimum_spanning_tree
 from scipy.spatial.distance import cdist
 
-from swarm_mj.mission.geometry import ROOT, gather_connected, spanning_tree
+from swarm_mj.mission.geometry import ROOT, count_strayed, gather_connected, spanning_tree
 
 # On a line, 10 m apart but for a gap, as robots 3, 0, 4, 1, 2: the middle one is robot 4.
 LINE_M = np.array([[10.0, 0.0], [45.0, 0.0], [55.0, 0.0], [0.0, 0.0], [20.0, 0.0]])
@@ -73,3 +73,15 @@ def test_iv_c_root_is_a_centre_of_the_tree(seed, num_robots):
         while parent[reached] != ROOT:
             reached, hops = parent[reached], hops + 1
             assert hops <= radius
+
+
+def test_robots_with_nobody_in_range_have_strayed():
+    """In a row at 0, 10, 25 and 90 m: with 12 m of range the last two, and with 20 m the last."""
+    position_m = np.array([[[0.0, 0.0], [10.0, 0.0], [25.0, 0.0], [90.0, 0.0]]])
+    everyone = np.ones((1, 4), dtype=np.bool_)
+    assert count_strayed(position_m, 12.0, everyone) == [2.0]
+    assert count_strayed(position_m, 15.0, everyone) == [1.0]  # at the range is within it
+    without_first = np.array([[False, True, True, True]])
+    assert count_strayed(position_m, 12.0, without_first) == [3.0]
+    alone = np.array([[False, False, False, True]])
+    assert count_strayed(position_m, 1000.0, alone) == [1.0]
