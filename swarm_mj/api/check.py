@@ -84,8 +84,8 @@ def check_convergence(
     mission = mission_of(check_convergence, task, mission_fields)
     components = {"channel": channel, "controller": controller, "scene": scene}
     for kind, name in components.items():
-        check_named(kind, name)
-    check_named("policy", policy)
+        check_named("check_convergence", kind, name)
+    check_named("check_convergence", "policy", policy)
     check_value(EngineOptions.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], max_missions, "max_missions")
     goal = Goal(within_s=within_s, share=share, below=below, unit=unit, level=level)

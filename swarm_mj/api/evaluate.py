@@ -209,7 +209,7 @@ def evaluate(
     mission = mission_of(evaluate, task, mission_fields)
     components = {"channel": channel, "controller": controller, "scene": scene}
     for kind, name in components.items():
-        check_named(kind, name)
+        check_named("evaluate", kind, name)
     check_value(EngineOptions.__dataclass_fields__["jobs"], num_jobs, "num_jobs")
     check_value(Study.__dataclass_fields__["episodes"], num_missions, "num_missions")
     study = Study(
@@ -234,11 +234,11 @@ def evaluate(
     return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
 
 
-def check_named(kind: str, part: object) -> None:
+def check_named(function: str, kind: str, part: object) -> None:
     """Raise TypeError for a part that is an object: other processes make theirs by name."""
     if not isinstance(part, str | Path | None):
         why = "it flies missions in several processes, which each make their own"
-        rule = f'this takes the {kind} by name, such as "my_file:Name"'
+        rule = f'{function} takes the {kind} by name, such as "my_file:Name"'
         raise TypeError(f"{rule}, not {part!r:.80}: {why}")
 
 
@@ -247,5 +247,5 @@ def _names(policies: str | Path | Sequence[str | Path]) -> tuple[str, ...]:
         policies = [policies]
     names = list(policies)  # what is given may be gone through once only
     for name in names:
-        check_named("policy", name)
+        check_named("evaluate", "policy", name)
     return tuple(listed(map(str, names)))

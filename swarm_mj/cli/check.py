@@ -133,6 +133,8 @@ def run(options: CheckOptions) -> int:
     if found is None:
         console.print(f"{ending} before the first missions were done.")
         return code
+    if found.policy != options.policy:
+        console.print(registry.FLOWN_AS)
     _report(options, found)
     if ending:
         console.print(f"{ending} after {found.num_missions} missions; these are shown.")

@@ -208,8 +208,8 @@ class Convergence:
 def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergence]:
     """Fly a study's missions until the claim is decided, or all are flown.
 
-    Missions count in the order of their seeds, whoever is done first, so that the answer does not
-    depend on how many fly at once.
+    Missions count in the order of their seeds, not in that in which they are done, so that the
+    answer does not depend on how many fly at once.
 
     Args:
         study: One policy in one regime; its episodes are the most that are flown.
@@ -226,7 +226,7 @@ def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergenc
     [(mission, policy)] = study.pairs
     cost = _checked_cost(study, mission, goal)
     _check_time(mission, goal)
-    flights = [Flight(batch=batch, below=goal.below) for batch in study.batches]
+    flights = [ConvergenceBatch(batch=batch, below=goal.below) for batch in study.batches]
     early: dict[int, np.ndarray] = {}  # done before others of lower seeds
     in_order: list[np.ndarray] = []
     with closing(engine.run(fly_to_convergence, flights)) as flown:
@@ -251,7 +251,7 @@ def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergenc
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flight:
+class ConvergenceBatch:
     """A batch of missions, and the cost below which each has converged."""
 
     batch: Batch
@@ -259,19 +259,19 @@ class Flight:
 
 
 @one_line_each()  # what is raised loses its places on the way between processes
-def fly_to_convergence(flight: Flight) -> Float[np.ndarray, "B"]:
+def fly_to_convergence(work: ConvergenceBatch) -> Float[np.ndarray, "B"]:
     """Fly a batch; return the first windows from which on its missions had converged, or nan."""
-    _, flown = start_batch(flight.batch)
+    _, flown = start_batch(work.batch)
     course: list[np.ndarray] = []
     for window in flown:
         cost = window.costs.velocity_variance_m2ps2
-        if flight.below is not None:
+        if work.below is not None:
             cost = TASK_COST.of_window(window.costs)
             assert cost is not None, "missions were found to have a cost"
         course.append(cost)
-    if flight.below is None:
+    if work.below is None:
         return agreed_window(np.stack(course))
-    return settled_window(np.stack(course), flight.below)
+    return settled_window(np.stack(course), work.below)
 
 
 def _check_time(mission: Mission, goal: Goal) -> None:

@@ -55,7 +55,7 @@ def _lower_bound(num_held: int, num_failed: int, level: float) -> float:
         return 0.0
     # At the share found, the missions are no evidence at all; below it, the less the more.
     highest = min(found, 1.0 - least)
-    if excess(highest) >= 0.0:  # of so many missions that the two are one number
+    if excess(highest) >= 0.0:  # after millions of missions, the two are one number
         return highest
     return float(root_scalar(excess, bracket=(least, highest)).root)
 

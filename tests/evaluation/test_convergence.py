@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from swarm_mj.control.motion import Flocking
-from swarm_mj.evaluation.convergence import Flight, Goal, converging, fly_to_convergence
+from swarm_mj.evaluation.convergence import ConvergenceBatch, Goal, converging, fly_to_convergence
 from swarm_mj.evaluation.engines import Local
 from swarm_mj.evaluation.sequential import share_bounds
 from swarm_mj.evaluation.study import Study
@@ -97,7 +97,7 @@ def test_a_cost_of_one_s_own_settles_below_its_limit():
     """Speeds fall by a tenth a window from about 2.3 m/s, so they are below 1 from the ninth on."""
     parts = {"controller": Rest(SHORT)}
     batch = study(episodes=5, **parts).batches[0]
-    window = fly_to_convergence(Flight(batch=batch, below=1.0))
+    window = fly_to_convergence(ConvergenceBatch(batch=batch, below=1.0))
     speed = [
         np.mean(np.linalg.norm(Swarm(SHORT, [seed]).states.velocity_mps[0], axis=1))
         for seed in batch.seeds
