@@ -106,7 +106,13 @@ def missions_title(result: Result) -> str:
 
 def _table(results: Sequence[Result], columns: Sequence[Shown], *, gap: int) -> Table:
     """Return the table of a regime, whose first result decides which columns there are."""
-    table = Table(box=SIMPLE_HEAD, show_edge=False, pad_edge=False, padding=(0, gap))
+    table = Table(
+        box=SIMPLE_HEAD,
+        show_edge=False,
+        pad_edge=False,
+        padding=(0, gap),
+        collapse_padding=True,
+    )
     table.add_column("policy", no_wrap=True)
     shown = [column for column in columns if _applies(column, results[0])]
     for column in shown:

@@ -172,6 +172,8 @@ BRIEF = (
         meaning=(
             "Heard: packets that reached their addressee or, of broadcasts, at least one robot."
         ),
+        # Both would not fit into 80 characters; `--wide` has it of flocks, too.
+        applies=lambda result: not _shows_variance(result),
     ),
 )
 

@@ -8,7 +8,7 @@ import pytest
 from forks import files
 
 from swarm_mj.cli import parse
-from swarm_mj.evaluation.results import COLUMNS
+from swarm_mj.evaluation.results import COLUMNS, CONVERGENCE
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
@@ -87,7 +87,9 @@ def test_results_are_what_the_library_computes(whole):
         np.testing.assert_allclose(row["episode_task_cost"], summary.task_cost_mean)
         assert result.task_cost_last_mean == pytest.approx(summary.task_cost_last.mean())
         episodes = ["episode_aoi", "episode_velocity_variance", "episode_task_cost"]
-        assert list(row) == [*COLUMNS, *episodes]
+        of_flocks = [f"episode_{name}" for name in CONVERGENCE]
+        assert list(row) == [*COLUMNS, *episodes, *of_flocks]
+        assert row["episode_strayed"] == [0.0] * 30
         assert {name: row[name] for name in COLUMNS} == {n: getattr(result, n) for n in COLUMNS}
 
 

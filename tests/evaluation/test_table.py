@@ -75,6 +75,24 @@ def test_the_table_has_what_most_people_read_unless_it_is_wide(printed):
         assert rare not in "\n".join(lines)
 
 
+def test_the_table_of_flocks_fits_into_80_characters_too(printed):
+    numbers = {
+        "baseline": "tdma",
+        "aoi_median": 53.4,
+        "aoi_p95": 163.3,
+        "aoi_difference_mean": 26.15,
+        "aoi_difference_ci_low": 20.83,
+        "aoi_difference_ci_high": 31.23,
+        "agreed_share": 1.0,
+        "agreed_window_median": 100.0,
+    }
+    result = some_result("spatial-tdma", 52.17, task="flocking", aoi_sem=2.97, **numbers)
+    lines = printed([result], 80, is_wide=False)
+    (row,) = [line for line in lines if line.startswith("spatial-tdma")]
+    assert row.endswith("100%, 100")
+    assert max(map(len, lines)) <= 80, row
+
+
 def test_a_long_name_widens_the_table_and_cuts_no_number(printed):
     name = "runs/" + 60 * "z"
     lines = printed([some_result(name, 123.456, task="flocking", **LARGEST)], 100)
