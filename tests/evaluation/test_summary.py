@@ -10,7 +10,7 @@ import scipy.stats
 
 from swarm_mj.evaluation import study as study_module
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.results import COLUMNS
+from swarm_mj.evaluation.results import COLUMNS, CONVERGENCE
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.mission import paper, reference
@@ -220,12 +220,15 @@ def test_json_has_the_columns_with_each_missions_costs(tmp_path):
     write_evaluated(tmp_path / "r.json", found)
     first, second = json.loads((tmp_path / "r.json").read_text())["results"]
     costs_of = ["episode_aoi", "episode_velocity_variance", "episode_task_cost"]
-    assert list(first) == [*COLUMNS, *costs_of]
+    of_flocks = [f"episode_{name}" for name in CONVERGENCE]
+    assert list(first) == [*COLUMNS, *costs_of, *of_flocks]
+    assert first["episode_agreed_window"] == [None] * 3
+    assert first["episode_strayed"] == [0.0] * 3
     assert first["episode_aoi"] == [40.0, 46.0, 43.0]
     assert second["episode_task_cost"] == pytest.approx([4.1, 4.8, 4.9])
     assert {name: second[name] for name in COLUMNS} == asdict(found[1].result)
     (tmp_path / "r.json").unlink()
-    assert "episode_task_cost" not in evaluated()[0].row
+    assert not {"episode_task_cost", *of_flocks} & evaluated()[0].row.keys()
     with pytest.raises(ValueError, match="not JSON compliant"):
         write_evaluated(tmp_path / "r.json", [replace(found[0], aoi=[math.nan])])
     assert not list(tmp_path.iterdir())
