@@ -43,7 +43,7 @@ MISSIONS, WINDOWS = 2, 12  # of smoke, each study's
 FOLDER = ROOT / "training" / "studies"
 SHIPPED = {"impairments": "impairments-small"}  # with the package, under other names
 STUDIES = tuple(sorted([*SHIPPED, *(path.stem for path in FOLDER.glob("*.toml"))]))
-OTHERS = ("gnn", "floor", "converging", "deciding")  # tables that no study can describe
+OTHERS = ("gnn", "floor", "converging-courses", "deciding")  # tables that no study can describe
 KINDS = (".csv", ".parquet")
 MAX_BYTES = 100_000_000
 
@@ -119,12 +119,13 @@ def fly_floor(settings: Settings) -> int:
     return bounds.run(replace(usual, teams=MISSIONS, seconds=0.1) if settings.is_smoke else usual)
 
 
-def fly_converging(settings: Settings) -> int:
-    """Fly flocks until they agree; return the exit code."""
-    usual = flocking_converges.Settings(out=settings.folder / "converging.csv")
-    return flocking_converges.run(
-        replace(usual, num_missions=MISSIONS) if settings.is_smoke else usual
+def fly_courses(settings: Settings) -> int:
+    """Fly flocks until they agree, window by window; return the exit code."""
+    usual = flocking_converges.Settings(
+        out=settings.folder / "converging-courses.csv", late=settings.folder / "converging-late.csv"
     )
+    few = {"num_missions": MISSIONS, "late_missions": MISSIONS, "sizes": (10,)}
+    return flocking_converges.run(replace(usual, **few) if settings.is_smoke else usual)
 
 
 def fly_gnn(settings: Settings) -> int:
@@ -158,7 +159,7 @@ def measure_deciding(settings: Settings) -> int:
 FLOWN_BY: dict[str, Callable[[Settings], int]] = {
     "deciding": measure_deciding,
     "floor": fly_floor,
-    "converging": fly_converging,
+    "converging-courses": fly_courses,
     "gnn": fly_gnn,
 }
 

@@ -9,6 +9,8 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
+from swarm_mj.mission import Mission
+
 AGREED = 0.01  # of the first window's velocity variance: a flock with less has agreed
 E_FOLDINGS = 3  # of the velocity variance, from the first window on, over which a decay is measured
 
@@ -58,6 +60,25 @@ def perfect_rate(window_s: float) -> float:
     The differences to the mean velocity shrink by 1 - Δt in each window (Eqs. 15 and 16).
     """
     return -2.0 * math.log(1.0 - window_s)
+
+
+def perfect_variance(mission: Mission) -> Float[np.ndarray, "T"]:
+    """Return the velocity variance of a flock that knows itself perfectly, over its windows.
+
+    It is the mean over missions. Start velocities are uniform within plus or minus V_max along each
+    of two axes; about their own team's mean, 1 - 1 / N of their variance is left. From there it
+    falls at `perfect_rate`.
+
+    Args:
+        mission: A flock's; that other tasks share news changes nothing about their velocities.
+
+    Returns:
+        The velocity variance after each window [m²/s²].
+    """
+    per_axis = mission.max_velocity_mps**2 / 3.0
+    start = 2.0 * per_axis * (1.0 - 1.0 / mission.num_robots)
+    window = np.arange(1, mission.num_windows + 1)
+    return start * np.exp(-perfect_rate(mission.window_s) * window)
 
 
 def decay(variance_m2ps2: Course) -> Decay:

@@ -2,13 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float
 
-from swarm_mj.evaluation.published import OPTIONS, ResultFigure, points
+from swarm_mj.evaluation.published import OPTIONS, Panel, ResultFigure, points
 from swarm_mj.evaluation.results import Result, carries_more, config_of, statistics_of
 from swarm_mj.mission import PAPERS
 from swarm_mj.protocol.mission_costs import MissionCost
@@ -17,6 +17,7 @@ from swarm_mj.system.fields import as_typed
 
 # A figure compares policies, so all else is the same.
 AGREED = ("episodes", "seed", "version")  # the commits stand in the caption
+PERFECT = "perfect knowledge"  # the method of a curve that no radio flew
 BEYOND = ("radio", *CALLED_WITH)  # columns that the paper's missions leave empty
 
 
@@ -110,6 +111,32 @@ def curves(figure: ResultFigure, cost: MissionCost, results: Sequence[Result]) -
         results: Those of the figure, as `results_of` selects them.
     """
     return [*_published_curves(figure, cost), *_own_curves(figure, cost, results)]
+
+
+def perfect_curve(figure: ResultFigure, panel: Panel, results: Sequence[Result]) -> Curve | None:
+    """Return what a panel's cost would be if all robots always knew all.
+
+    Args:
+        figure: One of the paper's, which sweeps a number of the mission.
+        panel: One of its panels.
+        results: Those of the figure, as `results_of` selects them.
+
+    Returns:
+        A curve over the places of the published ones and of the results; None if the panel has no
+        such law.
+    """
+    if panel.perfect is None:
+        return None
+    regime = figure.mission(preset_of(results))
+    own = {float(getattr(result, figure.x_name)) for result in results}
+    x = np.array(sorted({*figure.xs, *own}))
+    missions = [replace(regime, **{figure.x_name: each}) for each in x.tolist()]
+    return Curve(
+        method=PERFECT,
+        x=x,
+        mean=np.array([panel.perfect(mission) for mission in missions]),
+        sem=np.full(len(x), math.nan),
+    )
 
 
 def _published_curves(figure: ResultFigure, cost: MissionCost) -> list[Curve]:

@@ -12,7 +12,14 @@ from matplotlib.patheffects import withStroke
 from matplotlib.ticker import FixedLocator, LogLocator, NullLocator
 from scipy.optimize import isotonic_regression
 
-from swarm_mj.evaluation.figures.curves import Curve, NoPointsError, curves, method_of, results_of
+from swarm_mj.evaluation.figures.curves import (
+    Curve,
+    NoPointsError,
+    curves,
+    method_of,
+    perfect_curve,
+    results_of,
+)
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, look_of, styled, write_caption
 from swarm_mj.evaluation.published import MissionField, Panel, ResultFigure
 from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
@@ -43,7 +50,7 @@ PAPERS_BUDGET = "team decisions each, the paper's on 2,000,000 (III-C)"
 
 
 def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[str] = ()) -> Figure:
-    """Draw our curves and the published ones.
+    """Draw our curves and the published ones, above what perfect knowledge would reach.
 
     Args:
         figure: One of the paper's, such as `RESULT_FIGURES["fig4"]`.
@@ -69,6 +76,9 @@ def draw(figure: ResultFigure, results: Sequence[Result], methods: Collection[st
             shown = [curve for curve in shown if curve.method in methods]
             if not shown:
                 raise NoPointsError(f"{figure.name} has no points of {', '.join(methods)}")
+        perfect = perfect_curve(figure, panel, found)
+        if perfect is not None:
+            shown.insert(0, perfect)  # below the others
         costs.append(shown)
     return draw_curves(figure, found, costs)
 

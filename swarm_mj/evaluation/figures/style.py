@@ -48,6 +48,9 @@ OTHERS = {
     "floor": Look(
         label="proven floor", colour="#cccccc", marker="_", marker_size=6.0, line_width=2.5
     ),
+    "perfect knowledge": Look(
+        label="perfect knowledge", colour="#999999", marker="_", marker_size=4.0, line_width=1.0
+    ),
     "GNN": GNN,
     "linear GNN": VARIANT,
     "GNN generalized from 0.25": replace(VARIANT, label="GNN, from 0.25"),
