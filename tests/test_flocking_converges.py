@@ -44,6 +44,43 @@ def test_eq16_perfect_knowledge_shrinks_the_spread_by_a_tenth_a_window(preset, p
     np.testing.assert_allclose(np.mean(swarm.states.velocity_mps, axis=1), mean_mps, atol=1e-12)
 
 
+class CommonPicture:
+    """All robots aim at the true mean velocity as it was some windows ago."""
+
+    def __init__(self, windows_ago):
+        self.windows_ago = windows_ago
+
+    def start(self, _num_robots, _rngs):
+        self.means = []
+
+    def __call__(self, _buffers, states):
+        self.means.append(np.mean(states.velocity_mps, axis=1, keepdims=True))
+        return self.means[max(0, len(self.means) - 1 - self.windows_ago)] - states.velocity_mps
+
+
+@pytest.mark.parametrize("windows_ago", [0, 10, 50])
+def test_old_news_that_all_share_slows_nothing_down(windows_ago):
+    """Robots that aim at one velocity, whichever it is, come 0.9 times as near to each other."""
+    controller = CommonPicture(windows_ago)
+    swarm = Swarm(paper("flocking", num_robots=20), [1], channel=to_nobody, controller=controller)
+    start = np.sum(spread_mps(swarm) ** 2)
+    silence = np.arange(20)[None]
+    for k in range(1, 60):
+        costs = swarm.step_with_recipients(silence)
+        np.testing.assert_allclose(costs.velocity_variance_m2ps2, start * 0.81**k, rtol=1e-6)
+
+
+@pytest.mark.parametrize("name", ["tdma", *BASELINES])
+def test_flocks_that_know_all_velocities_at_the_start_agree_as_if_they_always_did(name):
+    """News is 26 windows old and more, yet all 8 flocks keep the rate of perfect knowledge."""
+    mission = paper("flocking", prior_knowledge="start", num_windows=60)
+    summary = summarise(rollout(Swarm(mission, range(8)), make_policy(name, mission)))
+    np.testing.assert_allclose(summary.decay_rate, perfect_rate(0.1), rtol=0.06)
+    unknown = paper("flocking", num_windows=150)
+    summary = summarise(rollout(Swarm(unknown, range(8)), make_policy(name, unknown)))
+    assert np.nanmedian(summary.decay_rate) < 0.65 * perfect_rate(0.1)
+
+
 @pytest.mark.parametrize("preset", [paper, reference])
 @pytest.mark.parametrize("physics", ["exact", "contact"])
 @pytest.mark.parametrize("name", BASELINES)

@@ -16,7 +16,7 @@ ROOT = Path(__file__).parents[2]
 # Studies of fewer missions than the paper's 100: the whole must fly in three hours.
 SMALLER = {
     *("ceiling", "elsewhere", "impairments", "position-noise"),
-    *("large-teams", "large-teams-small"),
+    *("converging-teams", "large-teams", "large-teams-small"),
 }
 
 
@@ -72,7 +72,7 @@ def test_an_interrupted_study_leaves_no_table(tmp_path, monkeypatch):
 @pytest.mark.parametrize("name", program.STUDIES)
 def test_every_study_can_be_read_and_says_its_missions(name):
     study = program.study_of(name)
-    assert study.seed in (2000, 3000)  # never those of tuning or training
+    assert study.seed in (2000, 3000, 980_000)  # never those of tuning or training
     assert study.pairs
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from synthetic import altered, result, sweep
 
-from swarm_mj.evaluation.figures.curves import curves, results_of
+from swarm_mj.evaluation.figures.curves import curves, perfect_curve, results_of
 from swarm_mj.evaluation.figures.drawing import caption
 from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
@@ -128,3 +128,15 @@ def test_the_caption_says_on_how_much_our_gnns_were_trained():
     assert "trained on 40,000 team decisions each" in caption(FIG3, results)
     longer = result("GNN", config={"receptive_field": 2, "decisions": 1_500_000})
     assert "trained on 40,000 to 1,500,000 team decisions" in caption(FIG3, [*results, longer])
+
+
+def test_perfect_knowledge_has_the_places_of_the_published_curves_and_the_results_by_hand():
+    """Sum over k of 0.81^k is 0.81 / 0.19; the start's variance is 2 V_max² / 3 of 39/40."""
+    results = [result("mst", "flocking", velocity_ratio=0.4)]
+    curve = perfect_curve(FIG6, FIG6.panels[1], results)
+    assert curve is not None
+    np.testing.assert_array_equal(curve.x, [0.15, 0.25, 0.325, 0.4, 0.5])
+    speed_mps = 20.0 * curve.x  # V_max: 1 km in 50 s is 20 m/s
+    expected = 2 * speed_mps**2 / 3 * 39 / 40 * (0.81 / 0.19) / 500
+    np.testing.assert_allclose(curve.mean, expected)
+    assert perfect_curve(FIG6, FIG6.panels[0], results) is None

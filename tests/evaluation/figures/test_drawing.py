@@ -154,6 +154,21 @@ def test_flocking_has_a_panel_for_each_cost():
     assert below.get_xlabel().endswith("[km in 50 s]")
 
 
+def test_fig6_what_perfect_knowledge_would_reach_stands_below_every_curve_of_the_variance():
+    """Also where only some policies are drawn; the age has no such line."""
+    results = [result("mst", "flocking", velocity_variance_mean=0.2, velocity_variance_sem=0.01)]
+    for methods in ((), ("mst",)):
+        above, below = draw(FIG6, results, methods).axes
+        assert "perfect knowledge" not in names(above)
+        assert "perfect knowledge" in names(below)
+        line, *_ = bars(below)["perfect knowledge"]
+        np.testing.assert_array_equal(line.get_xdata(), [0.15, 0.25, 0.325, 0.5])
+        assert line.get_ydata()[0] == pytest.approx(0.0499, abs=1e-4)
+        lowest = min(min(its.get_ydata()) for its, *_ in bars(below).values())
+        assert lowest == line.get_ydata()[0]
+        assert below.get_ylim()[0] < lowest
+
+
 @pytest.mark.parametrize("figure", RESULT_FIGURES.values(), ids=lambda figure: figure.name)
 def test_title_regime_and_caption_say_what_is_shown(figure):
     drawing = draw(figure, everything())
@@ -189,7 +204,7 @@ def test_ticks_are_the_published_places_and_all_curves_are_inside():
 
 
 # Not in this figure: limits, which have one of their own, with fewer policies, and grey `sotdma`.
-LEFT_OUT = ("floor", "training.ceiling:Annealed", "sotdma")
+LEFT_OUT = ("floor", "training.ceiling:Annealed", "perfect knowledge", "sotdma")
 
 
 def test_nothing_that_is_written_overlaps_or_leaves_the_page():

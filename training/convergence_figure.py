@@ -1,0 +1,161 @@
+"""How flocks agree over time, beside the law of perfect knowledge (docs/convergence.md).
+
+    make results STUDIES=converging-courses
+    python training/convergence_figure.py
+
+Draws assets/figures/convergence.svg and .png from `converging-courses.csv`. Also makes a table of
+docs/convergence.md from `converging-late.csv`, which the same flights leave.
+"""
+
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import LogLocator, NullLocator
+
+from swarm_mj.cli import script
+from swarm_mj.evaluation.figures.curves import PERFECT
+from swarm_mj.evaluation.figures.style import FAINT, look_of, save, styled, write_caption
+from swarm_mj.mission import Mission, paper
+from swarm_mj.protocol.agreement import AGREED, perfect_variance
+from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
+from swarm_mj.system.fields import setting
+from swarm_mj.system.reading import read_rows
+from swarm_mj.system.writing import Output, check_outputs
+
+ROOT = Path(__file__).resolve().parent.parent
+COURSES = "converging-courses.csv"
+LATE = "converging-late.csv"
+MOST_BYTES = 10_000_000
+SHOWN_S = 20.0
+LEAST = 1e-4  # of the first variance: what is drawn
+# Narrower than other figures: a telephone shows it so that its type can be read.
+SIZE_IN = (5.4, 4.3)
+TYPE_PT = 10.0
+
+
+@dataclass(frozen=True, kw_only=True)
+class ConvergenceFigure:
+    """Where the figure goes, and where its numbers are."""
+
+    out: Path = setting(
+        ROOT / "assets" / "figures" / "convergence",
+        "the files, without their endings",
+        shown="assets/figures/convergence",
+    )
+    results: Path = setting(
+        ROOT / "training" / "results", "where they are", metavar="DIR", shown="training/results"
+    )
+
+    def __call__(self) -> int:
+        """Draw the figure; return the exit code."""
+        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
+        check_outputs(*(Output("figure", path) for path in paths))
+        figure = draw(read_courses(self.results / COURSES), paper("flocking"))
+        for path in paths:
+            save(figure, path)
+        return 0
+
+
+@dataclass(frozen=True, kw_only=True)
+class PolicyCourse:
+    """The velocity variance of a policy's flocks after each window [m²/s²]."""
+
+    policy: str
+    low: np.ndarray  # nine in ten missions have more
+    median: np.ndarray
+    high: np.ndarray  # one in ten missions has more
+    origin: str  # missions, seeds and commit
+
+
+def read_courses(path: Path) -> list[PolicyCourse]:
+    """Return the courses in a file, in its order.
+
+    Raises:
+        ValueError: The file cannot be read.
+    """
+    by_policy: dict[str, list[dict[str, str]]] = {}
+    for _, row in read_rows(path, "table of courses", MOST_BYTES):
+        by_policy.setdefault(row["policy"], []).append(row)
+    found = []
+    for policy, rows in by_policy.items():
+        first = rows[0]
+        last_seed = int(first["seed"]) + int(first["episodes"]) - 1
+        missions = f"{first['episodes']} missions, seeds {first['seed']} to {last_seed}"
+        found.append(
+            PolicyCourse(
+                policy=policy,
+                low=np.array([float(row["variance_p10"]) for row in rows]),
+                median=np.array([float(row["variance_median"]) for row in rows]),
+                high=np.array([float(row["variance_p90"]) for row in rows]),
+                origin=f"{missions}; commit {first['commit']}",
+            )
+        )
+    return found
+
+
+def draw(courses: Sequence[PolicyCourse], mission: Mission) -> Figure:
+    """Draw the median of each policy with the middle four fifths of its flocks, and the law."""
+    law = perfect_variance(mission)
+    with styled():
+        figure = Figure(figsize=SIZE_IN, layout="constrained")
+        axes = figure.subplots()
+        for course in courses:
+            _draw_course(axes, course, mission.window_s)
+        its = look_of(PERFECT)
+        time_s = np.arange(1, len(law) + 1) * mission.window_s
+        axes.plot(time_s, law, color="#222222", linestyle="--", linewidth=1.6, label=its.label)
+        limit = AGREED * law[0]
+        axes.axhline(limit, color=FAINT, linewidth=0.9, linestyle=":")
+        note = {"color": FAINT, "fontsize": TYPE_PT - 1.0, "ha": "right", "va": "bottom"}
+        axes.text(SHOWN_S, limit, f"agreed: under {AGREED:.0%}", **note)
+        axes.set_yscale("log")
+        axes.set_xlim(0.0, SHOWN_S)
+        axes.set_ylim(LEAST * law[0], 1.4 * law[0])
+        axes.yaxis.set_major_locator(LogLocator())
+        axes.yaxis.set_minor_locator(NullLocator())
+        axes.set_xlabel("time [s]", fontsize=TYPE_PT)
+        axes.set_title(VELOCITY_VARIANCE.label, fontsize=TYPE_PT)
+        axes.tick_params(labelsize=TYPE_PT)
+        axes.legend(
+            frameon=False, fontsize=TYPE_PT - 1.0, ncols=3, loc="lower left", handlelength=1.4,
+            bbox_to_anchor=(-0.1, 1.08), columnspacing=1.0,
+        )  # fmt: skip
+        write_caption(figure, f"medians and the middle 80 % of {courses[0].origin}")
+    return figure
+
+
+def _draw_course(axes: Axes, course: PolicyCourse, window_s: float) -> None:
+    look = look_of(course.policy)
+    time_s = np.arange(1, len(course.median) + 1) * window_s
+    axes.fill_between(
+        time_s, course.low, course.high, color=look.colour, alpha=0.12, linewidth=0.0
+    )
+    every = {"marker": look.marker, "markersize": look.marker_size, "markevery": (20, 40)}
+    axes.plot(time_s, course.median, color=look.colour, label=look.label, **every)
+
+
+def late_table(folder: Path) -> str:
+    """Return late rates by policy and team size, beside what the ages make of them, as Markdown."""
+    rows = [row for _, row in read_rows(folder / LATE, "table of late rates", MOST_BYTES)]
+    sizes = list(dict.fromkeys(row["num_robots"] for row in rows))
+    cells = {(row["policy"], row["num_robots"]): row for row in rows}
+    lines = [["policy", *(f"{size} robots" for size in sizes)], ["---"] * (len(sizes) + 1)]
+    for policy in dict.fromkeys(row["policy"] for row in rows):
+        shown = [_late(cells[policy, size]) for size in sizes]
+        lines.append([f"`{policy}`", *shown])
+    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+
+
+def _late(row: dict[str, str]) -> str:
+    """Return the age, the rate measured and the rate by the ages."""
+    measured = f"{float(row['late_rate']):.3f}" if row["late_rate"] else "-"
+    return f"{float(row['age_mean']):.0f}: {measured}, {float(row['stale_rate']):.3f}"
+
+
+if __name__ == "__main__":
+    sys.exit(script(ConvergenceFigure, ConvergenceFigure.__call__))
