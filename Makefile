@@ -177,6 +177,7 @@ figures: setup
 	done
 	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig5 fig6 --policy $(OURS) \
 	  --out assets/figures/policies --force
+	$(BIN)/python training/convergence_figure.py
 	$(BIN)/python training/limits_figure.py
 	$(BIN)/python training/impairments_figure.py
 	$(BIN)/python training/readme_figure.py

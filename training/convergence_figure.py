@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import LogLocator, NullLocator
+from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import PERFECT
@@ -31,6 +31,7 @@ ROOT = Path(__file__).resolve().parent.parent
 COURSES = "converging-courses.csv"
 LATE = "converging-late.csv"
 MOST_BYTES = 10_000_000
+SPANS = ((1, 5), (5, 10), (10, 20), (20, 40))  # of windows
 SHOWN_S = 20.0
 LEAST = 1e-4  # of the first variance: what is drawn
 # Narrower than other figures: a telephone shows it so that its type can be read.
@@ -69,6 +70,7 @@ class PolicyCourse:
     low: np.ndarray  # nine in ten missions have more
     median: np.ndarray
     high: np.ndarray  # one in ten missions has more
+    known: np.ndarray  # robots that a robot has heard of, itself included
     origin: str  # missions, seeds and commit
 
 
@@ -92,6 +94,7 @@ def read_courses(path: Path) -> list[PolicyCourse]:
                 low=np.array([float(row["variance_p10"]) for row in rows]),
                 median=np.array([float(row["variance_median"]) for row in rows]),
                 high=np.array([float(row["variance_p90"]) for row in rows]),
+                known=np.array([float(row["known_mean"]) for row in rows]),
                 origin=f"{missions}; commit {first['commit']}",
             )
         )
@@ -118,6 +121,8 @@ def draw(courses: Sequence[PolicyCourse], mission: Mission) -> Figure:
         axes.set_ylim(LEAST * law[0], 1.4 * law[0])
         axes.yaxis.set_major_locator(LogLocator())
         axes.yaxis.set_minor_locator(NullLocator())
+        axes.yaxis.set_major_formatter("{x:g}")
+        axes.xaxis.set_major_locator(MultipleLocator(5.0))
         axes.set_xlabel("time [s]", fontsize=TYPE_PT)
         axes.set_title(VELOCITY_VARIANCE.label, fontsize=TYPE_PT)
         axes.tick_params(labelsize=TYPE_PT)
@@ -132,11 +137,46 @@ def draw(courses: Sequence[PolicyCourse], mission: Mission) -> Figure:
 def _draw_course(axes: Axes, course: PolicyCourse, window_s: float) -> None:
     look = look_of(course.policy)
     time_s = np.arange(1, len(course.median) + 1) * window_s
-    axes.fill_between(
-        time_s, course.low, course.high, color=look.colour, alpha=0.12, linewidth=0.0
-    )
+    axes.fill_between(time_s, course.low, course.high, color=look.colour, alpha=0.12, linewidth=0.0)
     every = {"marker": look.marker, "markersize": look.marker_size, "markevery": (20, 40)}
     axes.plot(time_s, course.median, color=look.colour, label=look.label, **every)
+
+
+def start_table(folder: Path) -> str:
+    """Return how much of the variance is left a window later, by how many are known, as Markdown.
+
+    Of each span of windows and each policy: the robots known, measured, and by `fresh_factor`.
+    """
+    mission = paper("flocking")
+    courses = read_courses(folder / COURSES)
+    lines = [["windows", *(f"`{course.policy}`" for course in courses)]]
+    lines.append(["---"] * len(lines[0]))
+    for first, last in SPANS:
+        cells = []
+        for course in courses:
+            left = course.median[last - 1] / course.median[first - 1]
+            measured = left ** (1.0 / (last - first))
+            known = float(np.mean(course.known[first - 1 : last]))
+            by_them = fresh_factor(known, mission.num_robots, mission.window_s)
+            cells.append(f"{known:.1f}: {measured:.2f}, {by_them:.2f}")
+        lines.append([f"{first} to {last}", *cells])
+    return _markdown(lines)
+
+
+def fresh_factor(known: float, num_robots: int, window_s: float) -> float:
+    """Return how much of the variance a window leaves if robots have fresh news of few only.
+
+    Args:
+        known: How many robots each one knows of, itself included; any others are as likely.
+        num_robots: In the team.
+        window_s: A window's length, dt.
+
+    Returns:
+        (1 - dt)² + (1 - (1 - dt)²) c, where c = (N - n) / (n (N - 1)).
+    """
+    perfect = (1.0 - window_s) ** 2
+    chance = (num_robots - known) / (known * (num_robots - 1))
+    return perfect + (1.0 - perfect) * chance
 
 
 def late_table(folder: Path) -> str:
@@ -148,6 +188,10 @@ def late_table(folder: Path) -> str:
     for policy in dict.fromkeys(row["policy"] for row in rows):
         shown = [_late(cells[policy, size]) for size in sizes]
         lines.append([f"`{policy}`", *shown])
+    return _markdown(lines)
+
+
+def _markdown(lines: Sequence[Sequence[str]]) -> str:
     return "\n".join(f"| {' | '.join(line)} |" for line in lines)
 
 

@@ -66,6 +66,7 @@ class CourseRow:
     variance_p10: float  # nine in ten missions have more
     variance_median: float
     variance_p90: float  # one in ten missions has more
+    known_mean: float  # robots that a robot has heard of, itself included
     episodes: int
     seed: int  # of the first mission
     commit: str | None
@@ -91,6 +92,7 @@ class Flown:
     """What became of the flocks of one policy."""
 
     variance_m2ps2: Course
+    known: Course  # robots that a robot has heard of, itself included, mean over robots
     summary: Summary
     age_counts: Int[np.ndarray, "bins"]  # news of others by age [slots]; of flocks that agreed
 
@@ -99,11 +101,13 @@ def fly(mission: Mission, policy_name: str, seeds: range) -> Flown:
     """Fly missions side by side; count ages at the ends of the second half of their windows."""
     swarm = Swarm(mission, seeds)
     windows = []
+    known = []
     counts = np.zeros((len(seeds), round(mission.num_windows / SLOT_WINDOWS) + 2), dtype=np.int64)
     everyone = np.ones((1, mission.num_robots), dtype=np.bool_)
     with WorkBar(policy_name, mission.num_windows, "windows") as bar:
         for window in rollout(swarm, make_policy(policy_name, mission)):
             windows.append(window)
+            known.append(np.mean(np.sum(swarm.buffers.is_known, axis=2), axis=1))
             if len(windows) > mission.num_windows // 2:
                 for b in range(len(seeds)):
                     its = slice(b, b + 1)
@@ -114,6 +118,7 @@ def fly(mission: Mission, policy_name: str, seeds: range) -> Flown:
     has_agreed = np.isfinite(agreed_window(variance))
     return Flown(
         variance_m2ps2=variance,
+        known=np.stack(known),
         summary=summarise(windows),
         age_counts=counts[has_agreed].sum(axis=0),
     )
@@ -174,8 +179,8 @@ def course_rows(settings: Settings) -> Iterator[CourseRow]:
     """Fly every policy; yield its windows."""
     seeds = range(settings.first_seed, settings.first_seed + settings.num_missions)
     for policy in POLICIES:
-        variance = fly(settings.mission, policy, seeds).variance_m2ps2
-        percentiles = np.percentile(variance, [10.0, 50.0, 90.0], axis=1).T.tolist()
+        flown = fly(settings.mission, policy, seeds)
+        percentiles = np.percentile(flown.variance_m2ps2, [10.0, 50.0, 90.0], axis=1).T.tolist()
         for index, (low, median, high) in enumerate(percentiles):
             yield CourseRow(
                 policy=policy,
@@ -183,6 +188,7 @@ def course_rows(settings: Settings) -> Iterator[CourseRow]:
                 variance_p10=low,
                 variance_median=median,
                 variance_p90=high,
+                known_mean=float(np.mean(flown.known[index])),
                 episodes=settings.num_missions,
                 seed=settings.first_seed,
                 commit=commit(),

@@ -49,6 +49,8 @@ def test_a_course_has_the_percentiles_of_the_flocks_velocity_variance(tables):
         high = spread[2] - 0.2 * (spread[2] - spread[1])
         found = [float(row[f"variance_{each}"]) for each in ("p10", "median", "p90")]
         np.testing.assert_allclose(found, [low, spread[1], high], rtol=1e-4)
+        known = np.mean(np.sum(swarm.buffers.timestamp > 0.0, axis=2))
+        assert float(row["known_mean"]) == pytest.approx(known, rel=1e-4)
 
 
 def test_late_rates_are_of_flocks_in_which_all_have_heard_of_all(tables):
