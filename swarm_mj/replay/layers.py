@@ -84,8 +84,12 @@ PACKET_PLOT = View(path="plots/radio")
 LINK_PLOT = View(path="plots/world")
 COST_PLOT = View(path="plots/task")
 MEAN_AGE = AGE_PLOT.below("mean")
+WORST_AGE = AGE_PLOT.below("worst")
 LEGEND = View(path="legend")
 ABOUT = Entity(path="about")
+
+# Whom each robot addressed and decoded in both slots; no view shows it, exports read it.
+PACKETS = Entity(path="packets")
 
 # By what they show: packets by their fate, links by how channel and belief differ.
 PACKET_LINES: dict[Fate, Lines] = {"overheard": OVERHEARD, "heard": HEARD}

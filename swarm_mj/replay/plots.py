@@ -59,7 +59,7 @@ def _age_plot(log: Log) -> Plot:
         layers.MEAN_AGE, "team, mean ± std", palette.MEAN_AGE, log.age_mean, std=log.age_std
     )
     worst = PlotCurve(
-        view.below("worst"), "worst pair", palette.WORST_AGE, log.age_max, is_hidden=True
+        layers.WORST_AGE, "worst pair", palette.WORST_AGE, log.age_max, is_hidden=True
     )
     ego_age = np.mean(log.ego_age, axis=1)
     ego = PlotCurve(view.below("ego"), f"{own}, mean", palette.EGO, ego_age)

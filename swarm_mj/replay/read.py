@@ -1,4 +1,4 @@
-"""Reads a replay back: whether it is whole, which windows it holds, and what a video shows.
+"""Reads a replay back: whether it is whole, its windows, what a video shows or an export writes.
 
 Rerun's format has no checksum of what it holds, so a replay ends in a digest: a second recording
 stream that is empty but for a field that rerun passes over. It repeats the first stream's footer,
@@ -7,6 +7,7 @@ so that rerun finds it where it looks.
 
 import hashlib
 import shlex
+from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
@@ -14,7 +15,9 @@ import pyarrow as pa
 from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.replay import layers, palette
+from swarm_mj.replay.export.flown import Flown
 from swarm_mj.replay.footage import Facts, Footage, shown_ground
 from swarm_mj.replay.layer_kinds import Entity, Lines3D, of_others
 from swarm_mj.replay.links import (
@@ -38,6 +41,8 @@ FOOTER = b"RRF2FOOT\x01\x00\x00\x00"  # the end of the footer
 END = (0).to_bytes(8, "little")  # the kind of a stream's last message
 FIELD = b"\xfa\x7f\x20"  # protobuf's tag of field 2047, and the length of a SHA-256
 SEAL_BYTES = HEADER_BYTES + len(END) + 8 + len(FIELD) + 32 + FOOTER_BYTES
+
+SHOWN = (layers.SCENE.contents, f"/{layers.MEAN_AGE.path}")  # all that a video shows
 
 # Components that change, by their entity's path and their name; one row per window.
 Columns = dict[tuple[str, str], pa.Array]
@@ -69,17 +74,36 @@ def check_replay(path: Path) -> None:
 
 def windows(path: Path) -> Int[np.ndarray, "T"]:
     """Return the numbers of a whole replay's windows, in order; 1 is a mission's first."""
-    return _windows(_columns(path), layers.SCENE_ROBOTS)
+    return _windows(_columns(path, SHOWN), layers.SCENE_ROBOTS)
 
 
 def read_footage(path: Path) -> Footage:
     """Return what a video shows; raise as `check_replay`, for replays of earlier versions, too."""
     check_replay(path)
     try:
-        return _footage(_facts(path), _columns(path))
+        return _footage(_facts(path), _columns(path, SHOWN))
     except (KeyError, ValueError, pa.ArrowException) as error:
         lack = "does not hold what a video shows, as replays of an earlier swarm-mj"
         raise ValueError(f"{path} {lack}; record it again") from error
+
+
+def read_flown(path: Path) -> Flown:
+    """Return what an export writes; raise as `read_footage`, and if no packets are kept by slot."""
+    footage = read_footage(path)
+    columns = _columns(path, [layers.AGE_PLOT.contents, f"/{layers.PACKETS.path}"])
+    packets = layers.PACKETS.path
+    if (packets, "recipient") not in columns:
+        lack = "does not keep its packets by slot, as replays of an earlier swarm-mj"
+        raise ValueError(f"{path} {lack}; record it again")
+    variance = _numbers(columns[layers.MEAN_AGE.path, "Measurements:variances"])
+    shape = (len(footage.window), SLOTS_PER_WINDOW, footage.facts.mission.num_robots)
+    return Flown(
+        footage=footage,
+        recipient=_numbers(columns[packets, "recipient"]).astype(int).reshape(shape),
+        heard=_numbers(columns[packets, "heard"]).astype(int).reshape(shape),
+        age_std=np.sqrt(variance),
+        age_worst=_numbers(columns[layers.WORST_AGE.path, "Scalars:scalars"]),
+    )
 
 
 def _facts(path: Path) -> Facts:
@@ -118,11 +142,10 @@ def _footage(facts: Facts, columns: Columns) -> Footage:
     )
 
 
-def _columns(path: Path) -> Columns:
+def _columns(path: Path, contents: Sequence[str]) -> Columns:
     # In one pass: each reader decodes the file anew.
     found: dict[tuple[str, str], list[pa.Table]] = {}
-    shown = [layers.SCENE.contents, f"/{layers.MEAN_AGE.path}"]
-    for chunk in RrdReader(path).stream().filter(content=shown, is_static=False):
+    for chunk in RrdReader(path).stream().filter(content=list(contents), is_static=False):
         table = pa.table(chunk.to_record_batch())
         entity = chunk.entity_path.removeprefix("/")
         for name in table.schema.names:

@@ -70,6 +70,7 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
         # First: rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
         draw_stage(out)
         draw_team(out)
+        keep_packets(out)
         draw_legend(out)
         charts.draw_tree(out)
         charts.draw_age_matrix(out)
@@ -115,6 +116,18 @@ def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:
         bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
         rate = bits / (len(log.window) * log.facts.mission.window_s)
         yield f"- **sent by the team**: {bits_per_second(rate)}"
+
+
+def keep_packets(out: RerunLog) -> None:
+    """Write whom each robot addressed and decoded in both slots of each window, for exports."""
+    log = out.log
+    # As recorded, and not packet by packet: most robots are silent and hear nobody, which
+    # compresses well. Robots have numbers below 10,000.
+    columns = rr.AnyValues.columns(
+        recipient=log.recipient.astype(np.int16).ravel(), heard=log.heard.astype(np.int16).ravel()
+    )
+    per_window = np.full(len(log.window), log.recipient[0].size)
+    out.timed(layers.PACKETS, columns.partition(per_window))
 
 
 def draw_team(out: RerunLog) -> None:

@@ -23,7 +23,12 @@ CORE = (
     "scipy",
 )
 # Modules that are named otherwise than the packages that bring them.
-BROUGHT_BY = {"PIL": "pillow", "dm_control": "dm-control", "rerun": "rerun-sdk"}
+BROUGHT_BY = {
+    "PIL": "pillow",
+    "dm_control": "dm-control",
+    "mcap_protobuf": "mcap-protobuf-support",
+    "rerun": "rerun-sdk",
+}
 # What numbers depend on; what is drawn from them is no change to them.
 SOURCES = ("swarm_mj", "assets", ":!assets/figures", ":!assets/pictures", "pyproject.toml")
 

@@ -35,28 +35,10 @@ def load(name):
         return dict(recording)
 
 
-def of_strongest(decodable, received_mw):
-    """The sender of the strongest decodable packet at each robot; itself is nobody."""
-    power_mw = np.where(decodable, received_mw, 0.0)
-    strongest = power_mw.argmax(axis=1)
-    return np.where(power_mw.max(axis=1) > 0.0, strongest, np.arange(strongest.shape[1]))
-
-
 def theirs(name):
-    """The sender that each robot decodes [k, j], by ns-3's decisions and powers.
-
-    Two rules are not ns-3's. Of several packets a robot takes the strongest (III-B); and under the
-    authors' half duplex, a packet that is addressed to a robot that sends is decided as if it did
-    not. ns-3's radios never decode while they send, so for these ns-3 was asked again without that
-    sender. Which packets are such is the authors' rule.
-    """
+    """The sender that each robot decodes [k, j], by ns-3's decisions and powers."""
     golden = load(name)
-    decodes = golden["decodes"]
-    if ns3.SETS[name].mission.half_duplex == "eavesdroppers":
-        robots = np.arange(decodes.shape[2])
-        is_addressed = golden["recipient"][:, :, None] == robots
-        decodes = decodes | (golden["decodes_if_silent"] & is_addressed)
-    return of_strongest(decodes, golden["received_mw"])
+    return ns3.heard(ns3.SETS[name].mission, golden["recipient"], golden)
 
 
 def started(mission, num_missions=1):

@@ -1,0 +1,74 @@
+"""`swarm-mj export`: writes a replay as files that other tools read."""
+
+import shlex
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from rich.console import Console
+
+from swarm_mj.replay.export.formats import FORMATS, Format, check_packages, files_of
+from swarm_mj.system.fields import files_read, setting, the_file
+from swarm_mj.system.interrupt import held_interrupts, raise_if_interrupted
+from swarm_mj.system.packages import need
+from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.writing import Output, check_outputs, write_bytes
+
+ENDINGS = (".rrd", ".mcap", ".tcl", ".csv")  # of files, which names of exports may be typed with
+
+
+@dataclass(frozen=True, kw_only=True)
+class ExportOptions:
+    """The options of `swarm-mj export`."""
+
+    EPILOG: ClassVar = (
+        "mcap: NAME.mcap for Foxglove, with the robots as a scene and as transforms. "
+        "ns2: NAME.tcl, how the robots moved, for ns-3, and NAME-packets.csv, what they sent when. "
+        "csv: NAME-positions.csv, NAME-packets.csv and NAME-ages.csv."
+    )
+    file: Path = setting(
+        help="an .rrd file that `swarm-mj fly` recorded", is_positional=True, reads=the_file
+    )
+    to: Format = setting(help="the format", choices=FORMATS)
+    out: Path | None = setting(
+        None,
+        "how the names of the files begin",
+        metavar="NAME",
+        shown="as the replay's, beside it",
+    )
+    force: bool = setting(False, "replace existing files")
+
+
+def run(options: ExportOptions) -> int:
+    """Run the command; return its exit code."""
+    files = files_of(options.to, _stem(options))
+    check_outputs(
+        *(Output("export", file) for file in files),
+        inputs=files_read(options),
+        must_be_new=not options.force,
+    )
+    need("rerun", "an export")
+    check_packages(options.to)
+    with Console(stderr=True, highlight=False).status("Reading ..."):
+        from swarm_mj.replay.read import read_flown  # rerun is slow to import
+
+        flown = read_flown(options.file)
+    contents: dict[Path, bytes] = {}
+    num_windows = len(flown.footage.window)
+    with WorkBar("Exporting", num_windows * len(files), "windows") as bar:
+        for file, make in files.items():
+            contents[file] = make(flown, bar.advance)
+    raise_if_interrupted()  # a library may have swallowed it
+    with held_interrupts():  # all files, or none
+        for file, content in contents.items():
+            write_bytes(file, content)
+    for file, content in contents.items():
+        size = f"{len(content) / 1e6:.1f} MB"
+        plain_console().print(f"Wrote {shlex.quote(str(file))}: {size}")
+    return 0
+
+
+def _stem(options: ExportOptions) -> Path:
+    """Return how the files' names begin: without the ending of a file, which may be typed."""
+    stem = options.file if options.out is None else options.out
+    return stem.with_suffix("") if stem.suffix.lower() in ENDINGS else stem
