@@ -7,14 +7,14 @@ from typing import ClassVar
 
 from rich.console import Console
 
-from swarm_mj.replay.export.formats import FORMATS, Format, check_packages, files_of
+from swarm_mj.replay.export.formats import FORMATS, check_packages, files_of
 from swarm_mj.system.fields import files_read, setting, the_file
 from swarm_mj.system.interrupt import held_interrupts, raise_if_interrupted
 from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import WorkBar, plain_console
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
-ENDINGS = (".rrd", ".mcap", ".tcl", ".csv")  # of files, which names of exports may be typed with
+ENDINGS = {".rrd", ".mcap", ".tcl", ".csv"}  # of files: those of a format may be typed, too
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,7 +29,7 @@ class ExportOptions:
     file: Path = setting(
         help="an .rrd file that `swarm-mj fly` recorded", is_positional=True, reads=the_file
     )
-    to: Format = setting(help="the format", choices=FORMATS)
+    to: str = setting(help="the format", choices=FORMATS, metavar="FORMAT")
     out: Path | None = setting(
         None,
         "how the names of the files begin",
@@ -59,7 +59,7 @@ def run(options: ExportOptions) -> int:
         for file, make in files.items():
             contents[file] = make(flown, bar.advance)
     raise_if_interrupted()  # a library may have swallowed it
-    with held_interrupts():  # all files, or none
+    with held_interrupts():  # all files or none, unless the disk fails
         for file, content in contents.items():
             write_bytes(file, content)
     for file, content in contents.items():
@@ -69,6 +69,15 @@ def run(options: ExportOptions) -> int:
 
 
 def _stem(options: ExportOptions) -> Path:
-    """Return how the files' names begin: without the ending of a file, which may be typed."""
-    stem = options.file if options.out is None else options.out
-    return stem.with_suffix("") if stem.suffix.lower() in ENDINGS else stem
+    """Return how the files' names begin; raise ValueError for what can begin no name."""
+    if options.out is None:
+        return options.file.with_suffix("")
+    stem = options.out
+    if stem.name in ("", ".."):
+        raise ValueError(f"out must be how the names of files begin, not {stem}")
+    ending = stem.suffix.lower()
+    own = {file.suffix for file in files_of(options.to, stem.with_suffix(""))}
+    if ending in ENDINGS - own:
+        names = " and ".join(file.name for file in files_of(options.to, Path("NAME")))
+        raise ValueError(f"{options.to} writes {names}, not {stem.name}; leave {ending} out")
+    return stem.with_suffix("") if ending in own else stem

@@ -17,7 +17,7 @@ from rerun.chunk import RrdReader
 
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.replay import layers, palette
-from swarm_mj.replay.export.flown import Flown
+from swarm_mj.replay.export.flown import FlownWindows
 from swarm_mj.replay.footage import Facts, Footage, shown_ground
 from swarm_mj.replay.layer_kinds import Entity, Lines3D, of_others
 from swarm_mj.replay.links import (
@@ -87,7 +87,7 @@ def read_footage(path: Path) -> Footage:
         raise ValueError(f"{path} {lack}; record it again") from error
 
 
-def read_flown(path: Path) -> Flown:
+def read_flown(path: Path) -> FlownWindows:
     """Return what an export writes; raise as `read_footage`, and if no packets are kept by slot."""
     footage = read_footage(path)
     columns = _columns(path, [layers.AGE_PLOT.contents, f"/{layers.PACKETS.path}"])
@@ -97,7 +97,7 @@ def read_flown(path: Path) -> Flown:
         raise ValueError(f"{path} {lack}; record it again")
     variance = _numbers(columns[layers.MEAN_AGE.path, "Measurements:variances"])
     shape = (len(footage.window), SLOTS_PER_WINDOW, footage.facts.mission.num_robots)
-    return Flown(
+    return FlownWindows(
         footage=footage,
         recipient=_numbers(columns[packets, "recipient"]).astype(int).reshape(shape),
         heard=_numbers(columns[packets, "heard"]).astype(int).reshape(shape),

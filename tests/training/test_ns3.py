@@ -6,6 +6,7 @@ reference` asks it again.
 """
 
 import math
+import re
 import shutil
 from dataclasses import replace
 from functools import cache
@@ -16,6 +17,7 @@ import pytest
 from reference import ns3
 from scipy.stats import ks_2samp
 
+from swarm_mj.mission import paper
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.fading import fade, mixed
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -200,3 +202,115 @@ def test_as_many_packets_decode_over_rayleigh_fading_as_in_ns3():
             count, of = golden["decodes"][:, i, j].sum(), len(golden["decodes"])
             error = math.sqrt(share * (1.0 - share) * (1.0 / of + 1.0 / num_slots))
             assert abs(count / of - share) <= 4.0 * error + 1e-9
+
+
+FAST = paper("random-walk", num_robots=10, num_windows=60, velocity_ratio=0.9)
+SMALL = ns3.Scenes(mission=FAST)
+
+
+class StandIn:
+    """Answers in place of ns-3, by the rules of ns-2's traces and SINR in free space."""
+
+    def said_by(self, _, lines):
+        answers = []
+        for line in lines:
+            word, *rest = line.split()
+            if word == "radio":
+                numbers = map(float, rest[:4])
+                self.power_w, self.noise_w, self.threshold, self.frequency_hz = numbers
+            elif word == "moves":
+                answers += self.moves(rest[0], int(rest[1]), list(map(float, rest[2:])))
+            else:
+                answers += self.scene(int(rest[0]), list(map(float, rest[1:])))
+        return answers
+
+    def moves(self, trace, num_robots, times):
+        """Where the robots are at each time, of a trace whose legs end before others begin."""
+        place_m = np.zeros((len(times), num_robots, 2))
+        from_m = np.zeros((num_robots, 2))
+        for line in Path(trace).read_text().splitlines():
+            words = line.replace('"', " ").split()
+            if words[0].startswith("$node_"):
+                axis = ("X_", "Y_", "Z_").index(words[2])
+                if axis < 2:
+                    place_m[:, int(words[0][7:-1]), axis] = float(words[3])
+                    from_m[int(words[0][7:-1]), axis] = float(words[3])
+            elif words[0] == "$ns_":
+                begin_s, robot = float(words[2]), int(words[3][7:-1])
+                to_m = np.array([float(words[5]), float(words[6])])
+                length_m = np.linalg.norm(to_m - from_m[robot])
+                for k, at_s in enumerate(times):
+                    if at_s > begin_s:
+                        share = min(1.0, (at_s - begin_s) * float(words[7]) / length_m)
+                        place_m[k, robot] = from_m[robot] + share * (to_m - from_m[robot])
+                from_m[robot] = to_m
+        return place_m.reshape(len(times), -1).tolist()
+
+    def scene(self, num_robots, numbers):
+        """Who decodes each sender, who would if it were silent, and the power at everyone [mW]."""
+        sends = numbers[:num_robots]
+        place_m = np.array(numbers[num_robots:]).reshape(-1, 2)
+        length_m = LIGHT_MPS / self.frequency_hz
+        power_w = np.zeros((num_robots, num_robots))
+        for i in range(num_robots):
+            for j in range(num_robots):
+                if i != j and sends[i]:
+                    way_m = math.dist(place_m[i], place_m[j])
+                    power_w[i, j] = self.power_w * (length_m / (4.0 * math.pi * way_m)) ** 2
+        for i in range(num_robots):
+            if sends[i]:
+                others_w = power_w.sum(axis=0) - power_w[i]
+                clears = power_w[i] / (self.noise_w + others_w) >= self.threshold
+                decodes = [bool(clears[j]) and not sends[j] for j in range(num_robots)]
+                yield from (decodes, clears.tolist(), (1e3 * power_w[i]).tolist())
+
+
+@pytest.fixture(scope="module")
+def export(tmp_path_factory):
+    """Where the export of a flight is, whose files' names begin with `a`."""
+    stem = tmp_path_factory.mktemp("export") / "a"
+    ns3.exported(SMALL.mission, "mst", stem)
+    return stem
+
+
+@pytest.fixture
+def flown_apart(export, tmp_path, monkeypatch):
+    """How many packets have other receivers, after a change to the export's trace or table."""
+    monkeypatch.setattr(ns3, "said_by", StandIn().said_by)
+
+    def apart(change_trace=str, change_table=str):
+        for ending, change in ((".tcl", change_trace), ("-packets.csv", change_table)):
+            text = export.with_name(f"a{ending}").read_text()
+            (tmp_path / f"a{ending}").write_text(change(text))
+        return ns3.flown_apart(Path("ns3"), SMALL, tmp_path / "a")
+
+    return apart
+
+
+def test_a_flight_that_is_exported_has_our_receptions_elsewhere(flown_apart, capsys):
+    assert flown_apart() == 0
+    said = capsys.readouterr().out
+    assert said.endswith("receptions; 0 packets differ\n")
+    assert int(said.split()[2]) > 100  # packets
+    assert int(said.split()[4]) > 100  # receptions
+
+
+def test_robots_that_stand_still_are_seen(flown_apart):
+    assert flown_apart(change_trace=lambda text: text.partition("$ns_")[0]) > 0
+
+
+def test_another_receiver_is_seen(flown_apart):
+    """No robot decodes itself."""
+    seven = r"^(\d+,\d,[\d.]+,7,.*),\d+,[\d ]+$"
+
+    def changed(text):
+        text, count = re.subn(seven, r"\1,1,7", text, count=1, flags=re.MULTILINE)
+        assert count == 1
+        return text
+
+    assert flown_apart(change_table=changed) == 1
+
+
+def test_another_time_is_seen(flown_apart):
+    """All requests and responses of the first windows at once."""
+    assert flown_apart(change_table=lambda text: re.sub(r",0\.\d+,", ",0.1,", text)) > 0

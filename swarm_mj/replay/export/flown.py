@@ -41,7 +41,7 @@ class TeamAges(NamedTuple):
 
 
 @dataclass(frozen=True, kw_only=True)
-class Flown:
+class FlownWindows:
     """T windows of N robots, as a replay keeps them.
 
     In each window the robots first move and then talk over two slots, so they are where the window

@@ -30,7 +30,7 @@ from mcap_protobuf.schema import register_schema
 
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.replay import palette
-from swarm_mj.replay.export.flown import Flown, PacketFate, SentPacket, number
+from swarm_mj.replay.export.flown import FlownWindows, PacketFate, SentPacket, number
 from swarm_mj.replay.palette import Colour
 
 WORLD = "world"  # the frame that all others are in
@@ -90,7 +90,7 @@ SCHEMAS: dict[str, Mapping[str, Mapping[str, Any]]] = {
 }
 
 
-def recording(flown: Flown, advance: Callable[[], None]) -> bytes:
+def recording(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the recording of a flight as the content of an MCAP file."""
     stream = io.BytesIO()
     out = _Recording(stream)
@@ -148,7 +148,7 @@ class _Recording:
         self._writer.finish()
 
 
-def _record_window(out: _Recording, flown: Flown, row: int) -> None:
+def _record_window(out: _Recording, flown: FlownWindows, row: int) -> None:
     window = int(flown.footage.window[row])
     begin_s = flown.begin_s(row)
     out.protobuf("/tf", _transforms(flown, row), begin_s)
@@ -188,7 +188,7 @@ def _timestamp(at_s: float) -> Timestamp:
     return Timestamp(seconds=seconds, nanos=nanos)
 
 
-def _transforms(flown: Flown, row: int) -> FrameTransforms:
+def _transforms(flown: FlownWindows, row: int) -> FrameTransforms:
     """Return the frame of each robot, r0 and so on, in the world's."""
     at = _timestamp(flown.begin_s(row))
     transforms: list[FrameTransform] = []
@@ -205,7 +205,7 @@ def _transforms(flown: Flown, row: int) -> FrameTransforms:
     return FrameTransforms(transforms=transforms)
 
 
-def _positions(flown: Flown, row: int) -> dict[str, object]:
+def _positions(flown: FlownWindows, row: int) -> dict[str, object]:
     x_m, y_m = flown.footage.position_m[row].T
     vx_mps, vy_mps = flown.velocity_mps(row).T
     return {
@@ -221,7 +221,7 @@ def _numbers(values: Sequence[float] | np.ndarray) -> list[float | None]:
     return [number(value) for value in values]
 
 
-def _bodies(flown: Flown, row: int) -> SceneEntity:
+def _bodies(flown: FlownWindows, row: int) -> SceneEntity:
     """Return the robots, coloured by the age of what the observer knows about them."""
     footage = flown.footage
     radius_m = RADIUS_SHARE * footage.ground.reach_m
@@ -249,7 +249,7 @@ def _bodies(flown: Flown, row: int) -> SceneEntity:
 
 
 def _packet_lines(
-    flown: Flown, row: int, packets: Sequence[SentPacket], at_s: float
+    flown: FlownWindows, row: int, packets: Sequence[SentPacket], at_s: float
 ) -> SceneEntity:
     """Return the packets of one slot as lines; each update replaces those of the slot before."""
     height_m = RADIUS_SHARE * flown.footage.ground.reach_m

@@ -12,11 +12,11 @@ import numpy as np
 
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.mission_radio import radio_of
-from swarm_mj.replay.export.flown import DIGITS, Flown
+from swarm_mj.replay.export.flown import DIGITS, FlownWindows
 from swarm_mj.replay.log import RESPONSE
 
 
-def trace(flown: Flown, advance: Callable[[], None]) -> bytes:
+def trace(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the trace of how the robots moved."""
     lines = [*_about(flown), *_start(flown)]
     for row in range(len(flown.footage.window)):
@@ -25,7 +25,7 @@ def trace(flown: Flown, advance: Callable[[], None]) -> bytes:
     return "".join(f"{line}\n" for line in lines).encode()
 
 
-def _about(flown: Flown) -> Iterator[str]:
+def _about(flown: FlownWindows) -> Iterator[str]:
     """Yield comments: the flight, and the numbers of its radio."""
     facts = flown.footage.facts
     mission = facts.mission
@@ -38,14 +38,14 @@ def _about(flown: Flown) -> Iterator[str]:
     )
 
 
-def _start(flown: Flown) -> Iterator[str]:
+def _start(flown: FlownWindows) -> Iterator[str]:
     for robot, (x_m, y_m) in enumerate(flown.footage.position_m[0].tolist()):
         yield f"$node_({robot}) set X_ {x_m:.{DIGITS}f}"
         yield f"$node_({robot}) set Y_ {y_m:.{DIGITS}f}"
         yield f"$node_({robot}) set Z_ 0.0"
 
 
-def _legs(flown: Flown, row: int) -> Iterator[str]:
+def _legs(flown: FlownWindows, row: int) -> Iterator[str]:
     """Yield the ways to where the robots are in the next window; those at rest have none."""
     position_m = np.round(flown.footage.position_m, DIGITS)
     if row + 1 == len(position_m):

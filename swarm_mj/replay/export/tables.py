@@ -4,7 +4,7 @@ import csv
 import io
 from collections.abc import Callable, Iterable
 
-from swarm_mj.replay.export.flown import Flown, number
+from swarm_mj.replay.export.flown import FlownWindows, number
 
 POSITION_COLUMNS = ("window", "seconds", "robot", "x_m", "y_m", "vx_mps", "vy_mps", "is_on")
 PACKET_COLUMNS = (
@@ -13,7 +13,7 @@ PACKET_COLUMNS = (
 AGE_COLUMNS = ("window", "seconds", "aoi", "aoi_std", "aoi_worst", "observer")
 
 
-class Table:
+class CsvTable:
     """A CSV file that grows by rows; an empty cell is what is not known."""
 
     def __init__(self, columns: Iterable[str]) -> None:
@@ -32,9 +32,9 @@ class Table:
         return self._text.getvalue().encode()
 
 
-def positions_table(flown: Flown, advance: Callable[[], None]) -> bytes:
+def positions_table(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the table of positions and velocities: a row for each window and robot."""
-    table = Table(POSITION_COLUMNS)
+    table = CsvTable(POSITION_COLUMNS)
     footage = flown.footage
     for row, window in enumerate(footage.window.tolist()):
         seconds = flown.begin_s(row)
@@ -55,9 +55,9 @@ def positions_table(flown: Flown, advance: Callable[[], None]) -> bytes:
     return table.content
 
 
-def packets_table(flown: Flown, advance: Callable[[], None]) -> bytes:
+def packets_table(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the table of packets, in the order in which they were sent."""
-    table = Table(PACKET_COLUMNS)
+    table = CsvTable(PACKET_COLUMNS)
     for row, window in enumerate(flown.footage.window.tolist()):
         for packet in flown.packets(row):
             table.add(
@@ -74,9 +74,9 @@ def packets_table(flown: Flown, advance: Callable[[], None]) -> bytes:
     return table.content
 
 
-def ages_table(flown: Flown, advance: Callable[[], None]) -> bytes:
+def ages_table(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the table of ages at the end of each window: the team's, and what the observer has."""
-    table = Table([*AGE_COLUMNS, *(f"r{robot}" for robot in range(flown.num_robots))])
+    table = CsvTable([*AGE_COLUMNS, *(f"r{robot}" for robot in range(flown.num_robots))])
     footage = flown.footage
     for row, window in enumerate(footage.window.tolist()):
         ages = flown.ages(row)
