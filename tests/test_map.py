@@ -214,6 +214,7 @@ NOT_TO_FLY = {
             {"torch", "stable_baselines3", "rerun", "dm_control", "matplotlib"},
         ),
         ("swarm_mj.api.fly, swarm_mj.cli.fly, swarm_mj.cli.replay", NOT_TO_FLY),
+        ("swarm_mj.cli.export", NOT_TO_FLY | {"mcap"}),
         ("swarm_mj; swarm_mj.fly", NOT_TO_FLY),
     ],
 )

@@ -84,6 +84,15 @@ USE_MINARI = """
 import gymnasium, minari
 minari.DataCollector(gymnasium.make("swarm_mj:swarm_mj/Stationary-v0", num_robots=5)).reset(seed=1)
 """
+USE_MCAP = """
+import swarm_mj
+from mcap.reader import make_reader
+from swarm_mj.cli import main
+swarm_mj.fly(num_robots=10, num_windows=50).save("flight.rrd")
+assert main(["export", "flight.rrd", "--to", "mcap"]) == 0
+with open("flight.mcap", "rb") as file:
+    assert make_reader(file).get_summary().statistics.message_count > 200
+"""
 INSTALLS = (
     Install(lines=("pip install .",), program=FLY_AND_REFUSE),
     Install(lines=("uv pip install --torch-backend cpu .",), program=FLY),
@@ -97,6 +106,7 @@ INSTALLS = (
         program=FLY_THE_CORE,
     ),
     Install(lines=("pip install '.[dm-control]'",), program=USE_DM_CONTROL),
+    Install(lines=("pip install '.[mcap]'",), program=USE_MCAP),
     Install(lines=("pip install '.[ray]'",), program="import ray, swarm_mj"),
     Install(lines=("pip install '.[slurm]'",), program="import submitit, swarm_mj"),
     Install(lines=("pip install pettingzoo",), program=USE_PETTINGZOO, is_on_top=True),

@@ -70,7 +70,6 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
         # First: rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
         draw_stage(out)
         draw_team(out)
-        keep_packets(out)
         draw_legend(out)
         charts.draw_tree(out)
         charts.draw_age_matrix(out)
@@ -118,18 +117,6 @@ def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:
         yield f"- **sent by the team**: {bits_per_second(rate)}"
 
 
-def keep_packets(out: RerunLog) -> None:
-    """Write whom each robot addressed and decoded in both slots of each window, for exports."""
-    log = out.log
-    # As recorded, and not packet by packet: most robots are silent and hear nobody, which
-    # compresses well. Robots have numbers below 10,000.
-    columns = rr.AnyValues.columns(
-        recipient=log.recipient.astype(np.int16).ravel(), heard=log.heard.astype(np.int16).ravel()
-    )
-    per_window = np.full(len(log.window), log.recipient[0].size)
-    out.timed(layers.PACKETS, columns.partition(per_window))
-
-
 def draw_team(out: RerunLog) -> None:
     """Draw everything that moves, the same on the map and in 3-D."""
     log = out.log
@@ -145,6 +132,7 @@ def draw_team(out: RerunLog) -> None:
     parent = log.parent[row, child]
     out.lines(layers.PARENTS, log.position_m[row, parent], log.position_m[row, child], row)
     _draw_radio(out)
+    keep_packets(out)
     _draw_packets(out)
     for fate, packets in log.packets.items():
         strips = arcs(packets, height_m, palette.PACKETS[fate].share)
@@ -246,6 +234,18 @@ def _draw_packets(out: RerunLog) -> None:
             origins_m = origins_m + aside_m * (way_m[:, ::-1] * (-1.0, 1.0) / length_m)
         vectors_m = palette.PACKETS[fate].share * way_m
         out.arrows(layers.PACKET_ARROWS[fate], origins_m, vectors_m, packets.row)
+
+
+def keep_packets(out: RerunLog) -> None:
+    """Write whom each robot addressed and decoded in both slots of each window, for exports."""
+    log = out.log
+    # As recorded, and not packet by packet: most robots are silent and hear nobody, which
+    # compresses well. Robots have numbers below 10,000.
+    columns = rr.AnyValues.columns(
+        recipient=log.recipient.astype(np.int16).ravel(), heard=log.heard.astype(np.int16).ravel()
+    )
+    per_window = np.full(len(log.window), log.recipient[0].size)
+    out.timed(layers.PACKETS, columns.partition(per_window))
 
 
 def _draw_mismatch(out: RerunLog, height_m: float) -> None:

@@ -10,7 +10,7 @@ from swarm_mj.replay.export import formats
 FLIGHT = ["fly", "--task", "random-walk", "--robots", "5", "--windows", "12", "--range-ratio"]
 NAMES = {
     "mcap": ["a.mcap"],
-    "ns2": ["a-packets.csv", "a.tcl"],
+    "ns2": ["a-schedule.csv", "a.tcl"],
     "csv": ["a-ages.csv", "a-packets.csv", "a-positions.csv"],
 }
 
@@ -54,7 +54,7 @@ def test_files_stand_beside_the_replay_and_are_replaced_by_force_only(walk, caps
     [
         ("mcap", "runs/b", ["b.mcap"]),
         ("mcap", "runs/b.mcap", ["b.mcap"]),
-        ("ns2", "runs/b.tcl", ["b-packets.csv", "b.tcl"]),
+        ("ns2", "runs/b.tcl", ["b-schedule.csv", "b.tcl"]),
         ("csv", "runs/b.CSV", ["b-ages.csv", "b-packets.csv", "b-positions.csv"]),
         ("csv", "runs/seed.5", ["seed.5-ages.csv", "seed.5-packets.csv", "seed.5-positions.csv"]),
     ],

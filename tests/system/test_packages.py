@@ -5,6 +5,7 @@ import shlex
 import subprocess
 import tomllib
 from importlib import metadata
+from itertools import chain
 from pathlib import Path
 
 import pytest
@@ -35,7 +36,8 @@ def test_versions_are_those_of_the_package():
 
 
 def test_every_package_under_another_name_is_one_of_ours():
-    ours = " ".join(PROJECT["dependencies"])
+    extras = PROJECT["optional-dependencies"].values()
+    ours = " ".join([*PROJECT["dependencies"], *chain.from_iterable(extras)])
     assert all(package in ours for package in BROUGHT_BY.values())
 
 

@@ -279,7 +279,7 @@ def flown_apart(export, tmp_path, monkeypatch):
     monkeypatch.setattr(ns3, "said_by", StandIn().said_by)
 
     def apart(change_trace=str, change_table=str):
-        for ending, change in ((".tcl", change_trace), ("-packets.csv", change_table)):
+        for ending, change in ((".tcl", change_trace), ("-schedule.csv", change_table)):
             text = export.with_name(f"a{ending}").read_text()
             (tmp_path / f"a{ending}").write_text(change(text))
         return ns3.flown_apart(Path("ns3"), SMALL, tmp_path / "a")

@@ -234,7 +234,7 @@ def exported(mission: Mission, policy: str, stem: Path) -> None:
 def flown_apart(program: Path, scenes: Scenes, stem: Path) -> int:
     """Fly an export again in ns-3; return how many packets have other receivers there."""
     num_robots = scenes.mission.num_robots
-    with stem.with_name(f"{stem.name}-packets.csv").open(newline="") as file:
+    with stem.with_name(f"{stem.name}-schedule.csv").open(newline="") as file:
         packets = list(csv.DictReader(file))
     seconds = sorted({float(packet["seconds"]) for packet in packets})
     slots = {at_s: k for k, at_s in enumerate(seconds)}

@@ -22,7 +22,7 @@ def _recording(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
 # What makes each file of a format, by how the file's name ends.
 FORMATS: Mapping[str, Mapping[str, Make]] = {
     "mcap": {".mcap": _recording},
-    "ns2": {".tcl": trace, "-packets.csv": packets_table},
+    "ns2": {".tcl": trace, "-schedule.csv": packets_table},
     "csv": {
         "-positions.csv": positions_table,
         "-packets.csv": packets_table,

@@ -9,7 +9,7 @@ from swarm_mj.system import packages
 
 NAMES = {
     "mcap": ["a.b.mcap"],
-    "ns2": ["a.b.tcl", "a.b-packets.csv"],
+    "ns2": ["a.b.tcl", "a.b-schedule.csv"],
     "csv": ["a.b-positions.csv", "a.b-packets.csv", "a.b-ages.csv"],
 }
 
@@ -25,6 +25,7 @@ def test_each_file_has_content(to, requests, nothing):
         "a.mcap": b"\x89MCAP",
         "a.tcl": b"# flocking",
         "a-packets.csv": b"window,slot,seconds,sender,recipient,fate,num_receivers,receivers\n1,0",
+        "a-schedule.csv": b"window,slot,seconds,sender,recipient,fate,num_receivers,receivers\n1,0",
         "a-positions.csv": b"window,seconds,robot,",
         "a-ages.csv": b"window,seconds,aoi,",
     }
