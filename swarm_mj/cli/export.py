@@ -23,7 +23,7 @@ class ExportOptions:
 
     EPILOG: ClassVar = (
         "mcap: NAME.mcap for Foxglove, with the robots as a scene and as transforms. "
-        "ns2: NAME.tcl, how the robots moved, for ns-3, and NAME-schedule.csv, what they sent when. "
+        "ns2: NAME.tcl for ns-3, how the robots moved, and NAME-schedule.csv, who sent when. "
         "csv: NAME-positions.csv, NAME-packets.csv and NAME-ages.csv."
     )
     file: Path = setting(

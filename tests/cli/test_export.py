@@ -3,6 +3,7 @@
 from pathlib import Path
 
 import pytest
+from file_limits import no_larger_files
 
 from swarm_mj.cli import main
 from swarm_mj.replay.export import formats
@@ -90,6 +91,13 @@ def test_without_its_packages_mcap_is_refused_before_the_work(walk, capsys, monk
     monkeypatch.setattr("swarm_mj.replay.read.read_flown", lambda _: pytest.fail("read"))
     assert main(["export", "a.rrd", "--to", "mcap"]) == 1
     assert "pip install 'swarm_mj[mcap]'" in capsys.readouterr().err
+    assert names(walk) == []
+
+
+def test_on_a_full_disk_nothing_is_left(walk, capsys):
+    with no_larger_files(1000):
+        assert main(["export", "a.rrd", "--to", "csv"]) == 1
+    assert "File too large" in capsys.readouterr().err
     assert names(walk) == []
 
 
