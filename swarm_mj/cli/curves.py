@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from swarm_mj.cli.mission_options import mission_flags
+from swarm_mj.cli.train_report import difference
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.learning.run_folder import (
     CURVE,
@@ -71,7 +72,7 @@ def run(options: CurvesOptions) -> int:
             raise ValueError(f"missions differ, {missions} and {others}; draw these runs apart")
     levels = runs[0].rows[0].references
     console = plain_console()
-    for line in _table(runs, levels):
+    for line in (*_table(runs, levels), *_comparisons(runs)):
         console.print(line)
     if options.plot:
         quiet_matplotlib()
@@ -112,6 +113,15 @@ def _table(runs: Sequence[Learned], levels: Mapping[str, float]) -> Iterator[str
         yield f"{name:{width}} {each.asked.training.seed:6} {numbers}"
     for policy, age in levels.items():
         yield f"{policy:{width}} {age:38.2f}"
+
+
+def _comparisons(runs: Sequence[Learned]) -> Iterator[str]:
+    """Yield how each run's last policy, which nothing selected, compares with the references."""
+    for each in runs:
+        compared = each.rows[-1].compared
+        said = [difference(name, cost, AOI) for name, cost in compared.items()]
+        if said:
+            yield f"{each.folder}: the last policy {'; '.join(said)}."
 
 
 def _lines(runs: Sequence[Learned]) -> "dict[str, LearningCurve]":

@@ -43,7 +43,7 @@ class Watch(WorkBar):
         """Show a status; return whether to go on."""
         progress = status.progress
         if self.has_begun and len(progress.curve) > self._num_rows:
-            self._console.print(_row(self._run, progress))
+            self._console.print(_row(progress))
         self.has_begun = True
         self._num_rows = len(progress.curve)
         self.what = status.what
@@ -87,12 +87,7 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     for name, each in choice.others.items():
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
         rows[NAMES.get(name, name)] = _amount(each, cost) + known
-    # The oracle flies few missions, those of evaluations only.
-    age = _reference_ages(progress.curve[0]).get(ORACLE)
-    if age is not None:
-        missions = f"on {_oracle_missions(run)} of the evaluations"
-        rows[ORACLE] = f"{_amount(age, AOI)}, {missions}; {REFERENCES[ORACLE]}"
-    elif max(training.robots) > selection.ORACLE_ROBOTS:
+    if ORACLE not in choice.others and max(training.robots) > selection.ORACLE_ROBOTS:
         too_many = f"more than {selection.ORACLE_ROBOTS} robots"
         rows[ORACLE] = f"not flown: it would take long with {too_many}"
     return rows
@@ -130,17 +125,29 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
 
 def _comparison(run: TrainingRun, other: str, cost: Cost) -> Iterator[str]:
     """Yield a sentence about another policy, unless the policy kept clearly beats it."""
-    error = cost.behind_sem
-    is_clear = error is not None and abs(cost.behind) > CLEAR * error
-    by = _amount(Cost(mean=abs(cost.behind), sem=error), run.training.cost)
-    if cost.behind > 0.0:
-        weaker = f"is no better than {other}, which is ahead by {by}"
-        place = f"loses to {other} by {by}" if is_clear else weaker
-    elif is_clear or error is None:
+    # Nobody expects it to reach the oracle, which knows everything.
+    if other == ORACLE or (cost.behind <= 0.0 and is_clear(cost) is not False):
         return
-    else:
-        place = f"is level with {other}: it is ahead by only {by}"
-    yield f"The policy kept {place} on the same missions."
+    yield f"The policy kept {difference(other, cost, run.training.cost)} on the same missions."
+
+
+def difference(other: str, cost: Cost, kind: MissionCost) -> str:
+    """Return in words how a policy compares with another one on the same missions."""
+    signed = _amount(Cost(mean=cost.behind, sem=cost.behind_sem), kind)
+    size = _amount(Cost(mean=abs(cost.behind), sem=cost.behind_sem), kind)
+    clear = is_clear(cost)
+    if clear is None:
+        return f"differs from {other} by {signed}, in a single mission"
+    if not clear:
+        return f"shows no significant difference from {other} ({signed})"
+    return f"loses to {other} by {size}" if cost.behind > 0.0 else f"beats {other} by {size}"
+
+
+def is_clear(cost: Cost) -> bool | None:
+    """Return whether a difference is beyond its error; None without one, of a single mission."""
+    if cost.behind_sem is None:
+        return None
+    return abs(cost.behind) > CLEAR * cost.behind_sem
 
 
 def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
@@ -150,12 +157,17 @@ def has_stopped_early(run: TrainingRun, progress: Progress) -> bool:
     return is_left and progress.has_stalled(limits.patience)
 
 
-def _row(run: TrainingRun, progress: Progress) -> str:
+def _row(progress: Progress) -> str:
     row = progress.curve[-1]
     note = "  best so far" if row is progress.best else ""
-    flown = {ORACLE: f" ({_oracle_missions(run)})"}
-    ages = _reference_ages(row).items()
-    others = "".join(f"  {name} {age.mean:.2f}{flown.get(name, '')}" for name, age in ages)
+    compared = selection.differences(row.references)
+    others = ""
+    for name, age in selection.reference_ages(row.references).items():
+        others += f"  {name} {age:.2f}"
+        if name in compared:
+            error = compared[name].behind_sem
+            spread = "" if error is None else f" ± {error:.2f}"
+            others += f" ({compared[name].behind:+.2f}{spread})"
     when = f"{row.decisions:>11,} decisions {row.minutes:7.1f} min"
     age = _amount(_age(row), AOI).removesuffix(f" {AOI.unit}")
     return f"{when}   held-out age {age}{note:13}{others}"
@@ -179,15 +191,10 @@ def _age(row: CurveRow) -> Cost:
 
 def _reference_ages(row: CurveRow) -> dict[str, Cost]:
     """Return the ages of reference policies that were flown on the same missions [windows]."""
-    ages = selection.reference_ages(row.references)
-    return {name: Cost(mean=age, sem=None) for name, age in ages.items()}
-
-
-def _oracle_missions(run: TrainingRun) -> str:
-    """Return how many of the evaluations' missions of each team size the oracle has flown."""
-    held_out = run.training.held_out
-    number = selection.reference_missions(run.training).get(ORACLE, held_out)  # an old run flew all
-    return f"{number} of {held_out} missions"
+    ages: dict[str, Cost] = {}
+    for name, age in selection.reference_ages(row.references).items():
+        ages[name] = Cost(mean=age, sem=None)
+    return ages
 
 
 def _amount(cost: Cost, kind: MissionCost) -> str:

@@ -39,8 +39,9 @@ class GraphVecEnv(SwarmVecEnv):
         self.num_nodes = max(training.robots)  # of every graph
         if self.agent == "team" and training.reward == "aoi":
             self.reward_unit = float(training.mission.num_windows)
+        self._num_windows = training.num_windows
         for n, batch in enumerate(self.batches):
-            last_window = training.mission.num_windows * (n + 1) // len(self.batches)
+            last_window = self._num_windows * (n + 1) // len(self.batches)
             batch.restart(self._draw_seeds(batch), max(1, last_window))
         sizes: list[int] = []  # of each mission's team
         for batch in self.batches:
@@ -81,7 +82,7 @@ class GraphVecEnv(SwarmVecEnv):
         return self._observe()
 
     def _begin(self, n: int) -> None:
-        self.batches[n].restart(self._draw_seeds(self.batches[n]))
+        self.batches[n].restart(self._draw_seeds(self.batches[n]), self._num_windows)
 
     def _draw_seeds(self, batch: MissionBatch) -> list[int]:
         # One generator for all batches: a checkpoint keeps its state alone.

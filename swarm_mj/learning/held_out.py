@@ -19,7 +19,6 @@ from swarm_mj.evaluation.batch import BatchCosts, costs_of
 from swarm_mj.evaluation.samples import standard_error
 from swarm_mj.learning import selection
 from swarm_mj.learning.selection import (
-    COMPARED,
     NEAR,
     OTHER_FLIGHTS,
     Choice,
@@ -27,6 +26,7 @@ from swarm_mj.learning.selection import (
     Cost,
     CurveRow,
     HeldOutCosts,
+    References,
 )
 from swarm_mj.learning.settings import (
     CHOICE_SEED,
@@ -85,28 +85,57 @@ def held_out_policy(training: Training, network: AggregationGnn, mission: Missio
     return GnnPolicy(network, extractor, silence_logit=training.silence_logit)
 
 
-def held_out_costs(
-    training: Training, network: AggregationGnn, on_window: OnWindow = lambda _share: None
-) -> HeldOutCosts:
-    """Fly the held-out missions; return their mean costs."""
+def evaluate(
+    training: Training,
+    network: AggregationGnn,
+    references: References | None = None,
+    on_window: OnWindow = lambda _share: None,
+) -> tuple[HeldOutCosts, Columns]:
+    """Fly the held-out missions.
+
+    Args:
+        training: The settings of the run.
+        network: It flies; its weights are not changed.
+        references: What `fly_references` has returned: policies to compare with, pair by pair.
+        on_window: It is called after every window with the share flown.
+
+    Returns:
+        The missions' mean costs; and, by the curve's columns, how much older than each reference's
+        the news is on the same missions, with its standard error.
+    """
     flights = Flights(training=training, on_window=on_window)
     flies = partial(held_out_policy, training, network)
-    return _means(training, flights.fly(flies, HELD_OUT_SEED, training.held_out))
+    flown = flights.fly(flies, HELD_OUT_SEED, training.held_out)
+    ages = _samples(flown, AOI)
+    behind: Columns = {}
+    for name in selection.REFERENCES:
+        theirs = (references or {}).get(selection.column(AOI, name))
+        if theirs is not None:
+            compared = _compared([np.array(each) for each in theirs], ages)
+            behind[selection.behind_column(name)] = compared.behind
+            if compared.behind_sem is not None:
+                behind[f"{selection.behind_column(name)}_sem"] = compared.behind_sem
+    return _means(training, flown), behind
 
 
-def reference_columns(
-    training: Training, curve: Sequence[CurveRow], on_window: OnWindow
-) -> Columns:
-    """Return the costs of `REFERENCES`, flown once a run, by the curve's columns."""
-    if curve:
-        return curve[0].references
-    columns: Columns = {}
-    flown_by = selection.reference_missions(training)
-    flights = Flights(training=training, on_window=on_window, total=len(flown_by))
-    for name, num_missions in flown_by.items():
-        flown = flights.fly(partial(make_policy, name), HELD_OUT_SEED, num_missions)
+def fly_references(training: Training, on_window: OnWindow) -> References:
+    """Fly `REFERENCES` on the held-out missions, the same as all evaluations; return their costs."""
+    references: References = {}
+    names = selection.references_flown(training)
+    flights = Flights(training=training, on_window=on_window, total=len(names))
+    for name in names:
+        flown = flights.fly(partial(make_policy, name), HELD_OUT_SEED, training.held_out)
         for cost in LEARNED_COSTS:
-            columns[selection.column(cost, name)] = _mean(_samples(flown, cost))
+            samples = _samples(flown, cost)
+            references[selection.column(cost, name)] = [each.tolist() for each in samples]
+    return references
+
+
+def reference_columns(references: References) -> Columns:
+    """Return the mean costs of references by the curve's columns."""
+    columns: Columns = {}
+    for name, by_size in references.items():
+        columns[name] = _mean([np.array(each) for each in by_size])
     return columns
 
 
@@ -131,7 +160,9 @@ def choose(
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
     costs = flights.fly(flies(kept), TEST_SEED, size)
     own = _samples(costs, training.cost)
-    compared: dict[str, MakePolicy] = {name: partial(make_policy, name) for name in COMPARED}
+    compared: dict[str, MakePolicy] = {}
+    for name in selection.references_flown(training):
+        compared[name] = partial(make_policy, name)
     if kept is not curve[0]:
         compared["first"] = flies(curve[0])
     others: dict[str, Cost] = {}

@@ -11,7 +11,14 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import NamedTuple
 
-from swarm_mj.learning.selection import OTHER_FLIGHTS, Columns, num_missions, reference_ages
+from swarm_mj.learning.selection import (
+    OTHER_FLIGHTS,
+    Columns,
+    Cost,
+    differences,
+    num_missions,
+    reference_ages,
+)
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.policies.gnn.feature_sets import remembers_packets
 from swarm_mj.policies.stored import POLICY
@@ -128,6 +135,7 @@ class CurvePoint(NamedTuple):
     aoi: float  # [windows]
     aoi_sem: float | None  # [windows]
     references: dict[str, float]  # ages of reference policies, by their names [windows]
+    compared: dict[str, Cost]  # with them, pair by pair; none in runs of 1.0.0
 
 
 def read_curve(path: Path) -> list[CurvePoint]:
@@ -145,6 +153,7 @@ def read_curve(path: Path) -> list[CurvePoint]:
                 aoi=row["aoi"],
                 aoi_sem=row.get("aoi_sem"),
                 references=reference_ages(row),
+                compared=differences(row),
             )
             if not (point.decisions >= 0 and point.aoi >= 0):
                 raise ValueError("a cell is negative, or no number")
@@ -192,7 +201,7 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - LIBRARIES - TORCH) + passes
-    file = WINDOW_BYTES * training.missions * size * first.num_windows + CHECKPOINT_BYTES
+    file = WINDOW_BYTES * training.missions * size * training.num_windows + CHECKPOINT_BYTES
     if limits.replay_every is None:
         return needs.Needs(memory=memory, file=file)
     num_replays = 1 + (limits.decisions or 0) // limits.replay_every

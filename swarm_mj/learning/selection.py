@@ -21,11 +21,10 @@ REFERENCES = {
     "spatial-tdma": "robots that believe themselves far apart share a turn",
     ORACLE: "knows where all robots are and what they know",
 }
-COMPARED = ("tdma", "spatial-tdma")  # at the end, too: the oracle takes longer than the network
-ORACLE_MISSIONS = 4  # of each team size: a window takes it 12 ms at 40 robots, 36 ms at 80 ...
-ORACLE_ROBOTS = 100  # ... and 472 ms at 200: larger teams it does not fly
+# The oracle does not fly larger teams: a window takes it 0.7 ms at 40 robots, 35 ms at 200.
+ORACLE_ROBOTS = 100
 NUM_BEST = 3  # evaluations whose policies are flown again
-OTHER_FLIGHTS = 2 + len(COMPARED)  # at the end: the one that is kept, again, and the first
+OTHER_FLIGHTS = 2 + len(REFERENCES)  # at the end: the one that is kept, again, and the first
 NEAR = 1.25  # times the least objective: worse policies have lost already
 MAX_MISSIONS = 40  # of each team size, to choose
 FLOWN_SHARE = 0.5  # of a run's decisions, for its choice; they cost less than learning
@@ -33,6 +32,8 @@ RESERVED_SHARE = 0.5  # of a run's minutes, at most, kept back for its choice
 MIN_GAIN = 0.005  # of the objective, that counts as learning
 
 Columns = dict[str, float]  # numbers by the names of the learning curve's columns
+# Each held-out mission's cost, by the name of the curve's column, then by team size.
+References = dict[str, list[list[float]]]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -55,7 +56,8 @@ class CurveRow:
     decisions: int  # of teams, before it
     minutes: float  # before its end
     costs: HeldOutCosts
-    references: Columns = field(default_factory=dict)  # costs of `REFERENCES`, such as `aoi_tdma`
+    # Costs of `REFERENCES`, such as `aoi_tdma`, and how far behind them it is, `aoi_behind_tdma`.
+    references: Columns = field(default_factory=dict)
     training: Columns = field(default_factory=dict)  # since the last one: `rollout/aoi` and others
 
     def columns(self) -> Columns:
@@ -109,7 +111,7 @@ class Choice:
     num_finalists: int
     num_missions: int  # of each team size that chose it, and as many others that tell its cost
     kept: Cost
-    others: dict[str, Cost]  # on the same missions: `COMPARED`, and `first`
+    others: dict[str, Cost]  # on the same missions: those of `REFERENCES` that fly, and `first`
 
 
 @dataclass(kw_only=True)
@@ -157,6 +159,7 @@ class Progress:
     optimiser: Columns = field(default_factory=dict)  # what PPO last logged of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
     evaluation_minutes: float = 0.0  # that the last one took
+    references: References = field(default_factory=dict)  # flown once; none in runs of 1.0.0
 
     @property
     def has_chosen(self) -> bool:
@@ -224,13 +227,29 @@ def reference_ages(row: Mapping[str, float]) -> dict[str, float]:
     return ages
 
 
-def reference_missions(training: Training) -> dict[str, int]:
-    """Return how many held-out missions of each team size each of `REFERENCES` flies, if any."""
-    flown = dict.fromkeys(REFERENCES, training.held_out)
-    flown[ORACLE] = min(training.held_out, ORACLE_MISSIONS)
-    if max(training.robots) > ORACLE_ROBOTS:
-        del flown[ORACLE]
-    return flown
+def behind_column(name: str) -> str:
+    """Return the curve's column for how much older than one of `REFERENCES` a policy's news is."""
+    return column(AOI, f"behind {name}".replace(" ", "_"))
+
+
+def references_flown(training: Training) -> list[str]:
+    """Return those of `REFERENCES` that fly a training's missions beside its policies."""
+    is_large = max(training.robots) > ORACLE_ROBOTS
+    return [name for name in REFERENCES if not (is_large and name == ORACLE)]
+
+
+def differences(row: Mapping[str, float]) -> dict[str, Cost]:
+    """Return the references' ages and how far behind them, pair by pair, a row's policy is.
+
+    A row of 1.0.0 has no differences, and of one mission a difference has no error.
+    """
+    compared: dict[str, Cost] = {}
+    for name, age in reference_ages(row).items():
+        behind = row.get(behind_column(name))
+        if behind is not None:
+            sem = row.get(f"{behind_column(name)}_sem")
+            compared[name] = Cost(mean=age, sem=None, behind=behind, behind_sem=sem)
+    return compared
 
 
 def candidates(curve: Sequence[CurveRow]) -> list[CurveRow]:

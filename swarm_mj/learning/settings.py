@@ -73,8 +73,17 @@ class PpoSettings:
     decay: float = setting(0.95, low=0.0, high=1.0)  # of the learning rate ...
     decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
     least_share: float = setting(0.1, low=0.0, high=1.0)  # ... but not below this share of it
-    num_steps: int = setting(32, low=1, high=100_000)  # windows of each mission in a rollout
-    num_minibatches: int = setting(10, low=1, high=10**6)  # into which a rollout is divided
+    num_steps: int = setting(
+        32,
+        "windows of each mission in a rollout",
+        label="rollout",
+        flag="--rollout-windows",
+        low=1,
+        high=100_000,
+    )
+    num_minibatches: int = setting(
+        10, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
+    )
     num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
     discount: float = setting(
         0.0,
@@ -139,6 +148,8 @@ class Training:
         reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
         ppo: Settings of PPO.
         missions: Missions flown side by side.
+        train_windows: Windows after which missions in training begin anew, at most those of
+            `mission`; None is all of them. Evaluations always fly whole missions.
         groups: Groups of missions that end at different times.
         seed: The same seed is the same policy.
         evaluate_every: Team decisions between two evaluations.
@@ -191,6 +202,15 @@ class Training:
     )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
+    # The first windows are the hardest: who begins more often practises them more.
+    train_windows: int | None = setting(
+        None,
+        "windows after which missions in training begin anew; evaluations fly all of --windows",
+        label="train-windows",
+        low=1,
+        high=MAX_DECISIONS,
+        shown="--windows",
+    )
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
     seed: int = common_setting(0, "the same seed is the same policy", low=0, high=MAX_SEED)
     evaluate_every: int = setting(
@@ -215,8 +235,18 @@ class Training:
         check_fit(self.network, self.features)
         if not self.robots:
             raise ValueError("robots must have at least 1 size")
+        if self.num_windows > self.mission.num_windows:
+            raise ValueError(
+                f"train-windows is {self.num_windows}, but missions have "
+                f"{self.mission.num_windows} windows; choose no more, or raise --windows"
+            )
         if self.credit_assignment == "robot" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
+
+    @property
+    def num_windows(self) -> int:
+        """Windows after which missions in training begin anew."""
+        return self.train_windows or self.mission.num_windows
 
     @property
     def cost(self) -> MissionCost:

@@ -223,22 +223,27 @@ class TrainingSession(BaseCallback):
         network = policy_of(self.ppo).acting_network()
         try:
             flies_others = partial(self._report, "Flying others")
-            others = held_out.reference_columns(training, progress.curve, flies_others)
+            if not progress.curve and not progress.references:
+                progress.references = held_out.fly_references(training, flies_others)
             self._count_time()
             means = progress.since_evaluation.means()
             begun = progress.minutes
             on_window = partial(self._report, "Evaluating")
-            costs = held_out.held_out_costs(training, network, on_window)
+            references = progress.references
+            costs, behind = held_out.evaluate(training, network, references, on_window)
         except Stopped:
             return
         self._count_time()
         progress.evaluation_minutes = progress.minutes - begun
         progress.since_evaluation = Accumulator()
+        others = held_out.reference_columns(references)
+        if not others and progress.curve:
+            others = progress.curve[0].references  # of a run that 1.0.0 began
         evaluation = CurveRow(
             decisions=decisions,
             minutes=progress.minutes,
             costs=costs,
-            references=others,
+            references=others | behind,
             training=means | progress.optimiser,
         )
         progress.curve.append(evaluation)

@@ -52,6 +52,18 @@ def test_a_line_a_run_and_the_references(runs, capsys):
     assert not list(runs.glob("*.png"))
 
 
+def test_the_last_policy_is_compared_with_the_references_on_the_same_missions(here, capsys):
+    columns = "aoi_tdma,aoi_greedy_oracle,aoi_behind_tdma,aoi_behind_tdma_sem"
+    columns += ",aoi_behind_greedy_oracle,aoi_behind_greedy_oracle_sem"
+    rows = ("0,0.5,60,4,26,12,34,3,48,4", "100,1,30,2,26,12,0.87,1.3,14,2")
+    put_run(here / "a", "\n".join([f"decisions,minutes,aoi,aoi_sem,{columns}", *rows, ""]))
+    assert main(["curves", "a"]) == 0
+    assert capsys.readouterr().out.splitlines()[-1] == (
+        "a: the last policy shows no significant difference from tdma (0.87 ± 1.30 windows); "
+        "loses to greedy-oracle by 14.00 ± 2.00 windows."
+    )
+
+
 def test_a_run_that_began_with_a_stored_policy_is_a_line_of_its_own(runs):
     put_run(runs / "b", FIRST, seed=2)
     whole = [_read(runs / name) for name in ("runs/a-1", "b")]

@@ -83,6 +83,21 @@ def test_missions_that_are_cut_are_truncated_and_others_end(credit):
                 assert not info or info["TimeLimit.truncated"]
 
 
+def test_missions_of_training_may_end_before_those_that_are_asked_for():
+    """Four batches that first end after 2, 4, 6 and 8 windows; from then on after 8 of 12."""
+    env, rng = env_of("robot", train_windows=8), np.random.default_rng(2)
+    env.reset()
+    rows = env.num_envs // 4
+    for window in range(1, 2 * 8 + 1):
+        _, _, done, infos = env.step(drawn(env, rng))
+        for n in range(4):
+            batch = slice(n * rows, (n + 1) * rows)
+            assert np.all(done[batch] == (window in (2 * (n + 1), 2 * (n + 1) + 8)))
+            # They were cut off, so what would have come next has a value.
+            assert all(bool(info) == bool(done[batch][0]) for info in infos[batch])
+    assert env.batches[0].mission.num_windows == WINDOWS
+
+
 def test_a_robots_reward_is_its_credit_per_pair():
     """Next to teams that fly alike until the last window, in which one robot each is silent.
 

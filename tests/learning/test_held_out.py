@@ -11,7 +11,8 @@ from tiny_policies import tiny_network
 from swarm_mj.learning.held_out import (
     Flights,
     choose,
-    held_out_costs,
+    evaluate,
+    fly_references,
     held_out_policy,
     notes_of,
     reference_columns,
@@ -23,6 +24,11 @@ from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
 NETWORK = tiny_network("extended")
+
+
+def held_out_costs(training, network):
+    """An evaluation beside no references."""
+    return evaluate(training, network)[0]
 
 
 def flown(training, size, seed):
@@ -123,7 +129,7 @@ def test_the_least_cost_on_fresh_missions_is_chosen_and_told_on_others():
     assert choice.kept.mean == pytest.approx(told.mean()) == pytest.approx(costs.aoi)
     assert choice.kept.sem == pytest.approx(told.std(ddof=1) / np.sqrt(3))
     assert (choice.num_finalists, choice.num_missions, choice.run_decisions) == (3, 3, 128)
-    for name in ("tdma", "spatial-tdma"):
+    for name in ("tdma", "spatial-tdma", "greedy-oracle"):
         other = ages(make_policy(name, TRAINING.mission), TEST_SEED)
         behind = told - other
         cost = choice.others[name]
@@ -170,7 +176,7 @@ def test_the_first_flies_beside_what_was_chosen_if_it_is_another():
     first = ages(flies(NETWORKS[0]), TEST_SEED)
     assert choice.others["first"].mean == pytest.approx(first.mean())
     only, _ = choose(TRAINING, CURVE[:1], NETWORKS, lambda _share: None)
-    assert set(only.others) == {"tdma", "spatial-tdma"}
+    assert set(only.others) == {"tdma", "spatial-tdma", "greedy-oracle"}
     assert only.kept.mean == pytest.approx(first.mean())
 
 
@@ -190,8 +196,8 @@ def test_the_card_says_on_which_missions_it_was_chosen(num_finalists, how):
     assert notes["missions"] == 2 * 3
 
 
-def test_the_oracle_flies_few_of_the_held_out_missions_and_no_large_teams(monkeypatch):
-    """They are the first 4 of 6; of teams of 101 there are none."""
+def test_all_references_fly_the_held_out_missions_and_the_oracle_no_large_teams(monkeypatch):
+    """Of teams of 101 it has none."""
     flown, fly = [], Flights.fly
 
     def noted(flights, policy_of, first_seed, size):
@@ -201,24 +207,45 @@ def test_the_oracle_flies_few_of_the_held_out_missions_and_no_large_teams(monkey
 
     monkeypatch.setattr(Flights, "fly", noted)
     training = replace(TRAINING, held_out=6)
-    columns = reference_columns(training, [], lambda _share: None)
+    columns = reference_columns(fly_references(training, lambda _share: None))
     six = [("tdma", HELD_OUT_SEED, 6), ("spatial-tdma", HELD_OUT_SEED, 6)]
-    assert flown == [*six, ("greedy-oracle", HELD_OUT_SEED, 4)]
+    assert flown == [*six, ("greedy-oracle", HELD_OUT_SEED, 6)]
     assert "aoi_greedy_oracle" in columns
-    columns = reference_columns(replace(training, robots=(4, 101)), [], lambda _share: None)
+    large = replace(training, robots=(4, 101))
+    columns = reference_columns(fly_references(large, lambda _share: None))
     assert flown[3:] == six
     assert "aoi_greedy_oracle" not in columns
 
 
+def test_an_evaluation_is_compared_mission_by_mission():
+    """With ages of 3 missions of each size that a hand has written: no reference has flown."""
+    training = small_training(sizes=(4, 5), held_out=3)
+    ages, errors = [], []
+    theirs = [[7.0, 6.0, 8.0], [9.0, 11.0, 10.0]]
+    for size, their in zip((4, 5), theirs, strict=True):
+        mine = [flown(training, size, HELD_OUT_SEED + b)[0].aoi_mean[0] for b in range(3)]
+        behind = np.array(mine) - their
+        ages.append(behind.mean())
+        errors.append(behind.std(ddof=1) / np.sqrt(3))
+    _, columns = evaluate(training, NETWORK, {"aoi_spatial_tdma": theirs})
+    assert columns == {
+        "aoi_behind_spatial_tdma": pytest.approx(sum(ages) / 2),
+        "aoi_behind_spatial_tdma_sem": pytest.approx(np.hypot(*errors) / 2),
+    }
+    alone = replace(training, robots=(4,), held_out=1)
+    _, columns = evaluate(alone, NETWORK, {"aoi_tdma": [[7.0]]})
+    assert list(columns) == ["aoi_behind_tdma"]
+
+
 def test_flights_report_their_shares_and_may_be_broken_off():
     evaluated, chosen = [], []
-    held_out_costs(small_training(sizes=(3, 6)), NETWORK, evaluated.append)
+    evaluate(small_training(sizes=(3, 6)), NETWORK, on_window=evaluated.append)
     np.testing.assert_allclose(evaluated, np.arange(1, 41) / 40)
     choice, _ = choose(TRAINING, CURVE, NETWORKS, chosen.append)
     assert chosen == sorted(chosen)
     assert 0.0 < chosen[0] < 0.05
     assert chosen[-1] <= 1.0
-    num_flights = 3 + 1 + 2 + (choice.decisions != 0)
+    num_flights = 3 + 1 + 3 + (choice.decisions != 0)
     assert len(chosen) == num_flights * TRAINING.mission.num_windows
 
     def enough(_share):

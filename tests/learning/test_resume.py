@@ -23,7 +23,7 @@ from small_runs import StopAfter, difference, end_of, run, small_training
 from swarm_mj.cli import main
 from swarm_mj.learning import selection
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
-from swarm_mj.learning.held_out import reference_columns
+from swarm_mj.learning.held_out import fly_references
 from swarm_mj.learning.selection import Progress
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
@@ -143,7 +143,7 @@ def _load_compiled_functions():
         env.step(np.array(recipients))
     for kind in (np.float32, np.float64):  # of stored policies and of those in training
         sample(np.zeros((2, 3), dtype=kind), np.array([0.1, 0.9]))
-    reference_columns(small_training(), [], lambda _share: None)
+    fly_references(small_training(), lambda _share: None)
 
 
 def _in_a_child(work):

@@ -53,6 +53,14 @@ def test_credit_per_team_under_the_reference_preset_is_the_authors():
     assert training.silence_logit == 0.0
 
 
+def test_missions_of_training_have_at_most_the_windows_of_those_asked_for():
+    training = usual_settings("robot", paper("stationary", num_windows=300), (40,))
+    assert training.num_windows == 300
+    assert replace(training, train_windows=200).num_windows == 200
+    with pytest.raises(ValueError, match="train-windows is 301, but missions have 300 windows"):
+        replace(training, train_windows=301)
+
+
 def test_silence_is_dropped_only_where_it_earns_nothing():
     robot = usual_settings("robot", paper("stationary"), (40,))
     assert robot.drops_silence == (robot.ppo.discount == 0.0)
