@@ -155,6 +155,7 @@ def evaluate(
     controller: str | None = None,
     scene: str | None = None,
     features: str | Sequence[str] = (),
+    networks: str | Sequence[str] = (),
     num_jobs: int = 1,
     engine: str = "local",
     address: str | None = None,
@@ -179,6 +180,7 @@ def evaluate(
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that adds obstacles to the arena, likewise; none unless given.
         features: Names of your own feature extractors that learned policies were trained with.
+        networks: Names of your own networks that they decide by.
         num_jobs: Processes. With more than one, a script must guard what it runs by
             `if __name__ == "__main__":`, as Python's multiprocessing says.
         engine: Where they are: "local", "ray" or "slurm"; docs/cluster.md tells more.
@@ -221,6 +223,7 @@ def evaluate(
         is_deterministic=is_deterministic,
         baseline=None if baseline is None else str(baseline),
         features=(features,) if isinstance(features, str) else tuple(features),
+        networks=(networks,) if isinstance(networks, str) else tuple(networks),
         components=Components(**components),
     )
     options = EngineOptions(jobs=num_jobs, engine=engine, address=address)

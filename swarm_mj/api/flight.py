@@ -98,7 +98,8 @@ def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flow
     """
     mission = flight.mission
     check_observer(flight.observer, mission.num_robots)
-    registry.check_used(flight.arguments.features, [flight.policy])
+    arguments = flight.arguments
+    registry.check_used(arguments.features, arguments.networks, [flight.policy])
     with console.status("Preparing the swarm ...") as status, compiling(status.update):
         swarm = Swarm(mission, [flight.seed], **flight.components.given)
         swarm.start(flight.policy)

@@ -36,6 +36,7 @@ def fly(
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
     features: str | Sequence[str] = (),
+    networks: str | Sequence[str] = (),
     **mission_fields: Unpack[PresetAndFields],
 ) -> Run:
     """Fly one mission, from the first window to the last.
@@ -58,6 +59,7 @@ def fly(
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that adds obstacles to the arena, likewise; none unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
+        networks: Names of your own networks that it decides by.
         **mission_fields: Any field of `Mission`, in its unit, such as `num_robots=20` or
             `preset="reference"`.
 
@@ -85,6 +87,7 @@ def fly(
         probability=probability,
         is_deterministic=is_deterministic,
         features=named,
+        networks=(networks,) if isinstance(networks, str) else tuple(networks),
     )
     made, name = _policy_of(policy, mission, arguments)
     way_out = "choose fewer num_robots or num_windows"

@@ -91,6 +91,7 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
             probability=self.probability,
             is_deterministic=self.is_deterministic,
             features=self.features,
+            networks=self.networks,
             components=self.components,
             baseline=None if self.baseline is None else flown.get(self.baseline, self.baseline),
         )

@@ -130,6 +130,8 @@ def _next_commands(options: FlyOptions, path: Path | None) -> Iterator[tuple[str
     parts = [f"--{kind} {shlex.quote(part)}" for kind, part in options.names.items()]
     if options.features:
         parts.append(f"--features {shlex.join(options.features)}")
+    if options.networks:
+        parts.append(f"--network {shlex.join(options.networks)}")
     named = shlex.join(dict.fromkeys(policies))
     flags = " ".join((mission_flags(options.mission), *parts))
     yield "Compare some:", f"{name} evaluate --policy {named} --episodes 5 {flags}"

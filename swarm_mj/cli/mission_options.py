@@ -58,6 +58,14 @@ class PolicyOptions(Components):
         metavar=SHOWN_AS,
         reads=files_named,
     )
+    networks: tuple[str, ...] = setting(
+        (),
+        "that a learned policy decides by, if it is someone's own; give it again",
+        flag="--network",
+        group=GROUP,
+        metavar=SHOWN_AS,
+        reads=files_named,
+    )
 
     @property
     def components(self) -> Components:
@@ -71,6 +79,7 @@ class PolicyOptions(Components):
             probability=self.probability,
             is_deterministic=self.is_deterministic,
             features=self.features,
+            networks=self.networks,
         )
 
 

@@ -155,7 +155,7 @@ def _check_texts(value: object) -> None:
 def _check_names_no_code(own: Given) -> None:
     """Raise ValueError if a file's table [study] names users' code, which making it would run."""
     named = [name for name in own["policies"] if registry.is_own_policy(name)]
-    named += [str(name) for name in own.get("features", ())]
+    named += [str(name) for name in (*own.get("features", ()), *own.get("networks", ()))]
     for name in own["components"].names.values():
         if not name.startswith(TABLE):
             named.append(name)

@@ -21,6 +21,7 @@ from swarm_mj.system.fields import common_setting, files_read, same_as, setting,
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
+from swarm_mj.system.user_code import files_named
 from swarm_mj.system.writing import Output, check_outputs
 
 
@@ -50,6 +51,12 @@ class TrainOptions:
     init: Path | None = common_setting(
         None, "begin with a stored policy", metavar="POLICY", reads=the_file
     )
+    logger: str | None = setting(
+        None,
+        "a logger of your own, which gets every evaluation; one that fails does not end the run",
+        metavar="module:Name",
+        reads=files_named,
+    )
     yes: bool = setting(False, YES)
     settings: Given = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()
@@ -61,12 +68,22 @@ def run(options: TrainOptions) -> int:
     with console.status("Preparing ..."):
         asked = _asked_run(options)
         tell_cores(asked.training.threads, "threads")
+        from swarm_mj.learning.loggers import make_logger
         from swarm_mj.learning.train import train  # stable-baselines3 is slow to import
+
+        logger = make_logger(options.logger, options.out) if options.logger else None
     try:
         with memory_errors(), deferred_interrupt() as is_interrupted:
             watch = Watch(console, asked, is_interrupted)
             with watch:
-                progress = train(asked, options.out, listener=watch, is_resumed=options.resume)
+                progress = train(
+                    asked,
+                    options.out,
+                    listener=watch,
+                    is_resumed=options.resume,
+                    logger=logger,
+                    complain=console.print,
+                )
             _print(options.out, asked, progress, is_over=not watch.has_stopped)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
@@ -106,7 +123,7 @@ def _begun_run(options: TrainOptions) -> TrainingRun:
     if options.init is not None:
         raise ValueError(f"{options.out} has begun, so --init {options.init} is too late")
     train_settings.refuse_others(options.settings, run.training, f"the run in {options.out}")
-    train_settings.load_own(run.training.features, run.training)
+    train_settings.load_own(run.training.features, run.training.own_network, run.training)
     return run
 
 

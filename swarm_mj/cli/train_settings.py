@@ -87,7 +87,7 @@ def asked_settings(
     components = Components(**_part("components", given))
     training = replace(training, missions=missions, components=components)
     # The user's own features count only once they are loaded, and the network is made for them.
-    load_own(own.get("features", training.features), training)
+    load_own(own.get("features", training.features), own.get("own_network", ""), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
     training = replace(
@@ -120,10 +120,11 @@ def _begun_with(training: Training, init: GnnConfig, policy: str, given: Given) 
         network=init.network,
         features=init.features,
         silence_logit=init.silence_logit,
+        own_network=init.own_network,
     )
     of_network: Given = {}
     for place, value in given.items():
-        if place.startswith(("features", "network")):
+        if place.startswith(("features", "network", "own_network")):
             of_network[place] = value
     refuse_others(of_network, training, f"the {policy}")
     check_named(init.features, own_names(given), policy)
@@ -134,14 +135,18 @@ def own_names(given: Given) -> list[str]:
     """Return the names of custom components and features among settings that were given."""
     names: list[str] = []
     for place, value in given.items():
-        may_be_own = place.startswith(("features", "components."))
+        may_be_own = place.startswith(("features", "own_network", "components."))
         if may_be_own and is_own(value):
             names.append(value)
     return names
 
 
-def load_own(features: str, training: Training) -> None:
-    """Load a run's custom features and components; raise ValueError if one cannot be made."""
+def load_own(features: str, network: str, training: Training) -> None:
+    """Load a run's own features, network and parts; raise ValueError if one cannot be made."""
+    if network:
+        from swarm_mj.policies.gnn.own_networks import load_network  # torch is slow to import
+
+        load_network(network)
     if is_own_set(features):
         load_features(features)
     training.components.made(training.mission)

@@ -296,6 +296,11 @@ def carries_more(result: Result) -> bool:
     return result.payload not in (None, "none")
 
 
+def has_memory(result: Result) -> bool:
+    """Return whether robots decide by more than their buffers now: a network that remembers."""
+    return bool(config_of(result).get("memory"))
+
+
 def is_flock(result: Result) -> bool:
     """Return whether the robots were to agree on one velocity."""
     return result.task == "flocking"

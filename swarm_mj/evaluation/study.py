@@ -36,6 +36,7 @@ class Study:
         probability: Of a transmission, for the policies that have one; None is each policy's own.
         is_deterministic: Whether learned policies take the most probable recipient.
         features: Users' own extractors that learned policies may load.
+        networks: Users' own networks, likewise.
         components: Channel, controller and scene, where they are not the mission's own.
         baseline: Whom the others are compared to, mission by mission; None is the first policy.
 
@@ -52,6 +53,7 @@ class Study:
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
     # Users' own extractors that learned policies may load.
     features: tuple[str, ...] = setting((), reads=files_named)
+    networks: tuple[str, ...] = setting((), reads=files_named)  # likewise
     components: Components = setting(Components(), former=("parts",))
     baseline: str | None = common_setting(
         None,
@@ -78,9 +80,9 @@ class Study:
         _ = self.parameters  # makes every policy, so that a bad one is refused now
         for regime in self.regimes:
             self.components.made(regime)
-        if self.features:
+        if self.features or self.networks:
             made = (self.make_policy(name, self.regimes[0]) for name in self.policies)
-            registry.check_used(self.features, made)
+            registry.check_used(self.features, self.networks, made)
         if self.baseline is not None and self.baseline not in self.policies:
             raise ValueError(
                 f"baseline must be one of the policies evaluated, {', '.join(self.policies)}, not "
@@ -160,6 +162,7 @@ class Study:
             # The others have no most probable recipient, and refuse to be asked for it.
             is_deterministic=self.is_deterministic and registry.is_learned(policy),
             features=self.features,
+            networks=self.networks,
         )
 
     def task_cost(self, regime: Mission) -> tuple[str, str] | None:
@@ -177,7 +180,7 @@ class Study:
     def header(self) -> dict[str, Any]:
         """All that the batches' costs depend on, as JSON gives it back."""
         own = [name for name in self.policies if registry.is_own_policy(name)]
-        own += [*self.features, *self.components.names.values()]
+        own += [*self.features, *self.networks, *self.components.names.values()]
         header = {
             "version": version(),
             "commit": commit(),

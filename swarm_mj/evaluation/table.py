@@ -9,7 +9,7 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
+from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of, has_memory
 from swarm_mj.evaluation.table_columns import BRIEF, NONE, WIDE, Shown, number, said
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.presets import paper
@@ -128,8 +128,10 @@ def _applies(column: Shown, result: Result) -> bool:
 
 
 def _name(result: Result) -> str:
-    """Return a policy's name; below it its option, or the payload beyond T, M and P."""
+    """Return a policy's name; below it its option, or what it has beyond the paper's policies."""
     name = result.policy.replace(" --", "\n  --")
+    if has_memory(result):
+        name = f"{name}\n  + memory"
     return f"{name}\n  + {result.payload}" if carries_more(result) else name
 
 
@@ -174,3 +176,5 @@ def _legend(results: Sequence[Result], columns: Sequence[Shown]) -> Iterator[str
         )
     if any(map(carries_more, results)):
         yield f"+: packets {CARRIES_MORE}, which the paper's carry."
+    if any(map(has_memory, results)):
+        yield "+ memory: robots also decide by earlier windows, which the paper's do not."

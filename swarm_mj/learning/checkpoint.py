@@ -24,14 +24,14 @@ from swarm_mj.learning.ppo import policy_of
 from swarm_mj.learning.selection import Columns, Progress, candidates, curve_row_of
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.feature_sets import check_unchanged, known_names
-from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.network import Network
 from swarm_mj.system.reading import open_file, read_json, read_plain
 from swarm_mj.system.writing import write_bytes
 
 CHECKPOINT_VERSION = 5  # that of 1.0.0
 MOMENTS = ("mean", "var", "count")  # of `VecNormalize`'s returns
 
-Networks = dict[int, AggregationGnn]  # of policies that may be kept, by their decisions
+Networks = dict[int, Network]  # of policies that may be kept, by their decisions
 
 
 @dataclass(frozen=True)
@@ -49,6 +49,7 @@ def save(
     name, key, *place = np.random.get_state()  # noqa: NPY002
     batches = env_of(model).batches
     env = model.get_env()
+    memory = env_of(model).memory
     normaliser = {}  # of rewards
     if isinstance(env, VecNormalize):
         for moment in MOMENTS:
@@ -71,6 +72,8 @@ def save(
         # When a run goes on, its missions are flown again from seeds and decisions, from which all
         # that physics, channel and buffers hold follows.
         "recipients": recipients,
+        # It followed from weights that are no more.
+        "memory": None if memory is None else torch.tensor(memory),
         "seeds": [batch.seeds for batch in batches],
         "last_windows": [batch.last_window for batch in batches],
         "episode_starts": torch.tensor(model._last_episode_starts),
@@ -135,6 +138,8 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     model.num_timesteps = num_rollouts * model.n_steps * env.num_envs
     model._n_updates = num_rollouts * model.n_epochs
     recipients = [state["recipients"][n].numpy() for n in range(len(env.batches))]
+    if env.memory is not None:
+        env.memory[:] = state["memory"].numpy()
     model._last_obs = env.replay(state["seeds"], state["last_windows"], recipients)
     model._last_episode_starts = state["episode_starts"].numpy()
     rewards = model.get_env()

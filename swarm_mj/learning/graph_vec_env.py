@@ -3,7 +3,7 @@
 Batches are staggered, so that every rollout holds windows from all parts of a mission.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -11,11 +11,13 @@ import numpy as np
 from gymnasium import spaces
 from jaxtyping import Bool
 from stable_baselines3 import PPO
+from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.vec_env import SwarmVecEnv
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
+from swarm_mj.policies.gnn.own_networks import empty_network
 from swarm_mj.protocol.buffers import NO_PARENT
 
 
@@ -49,6 +51,17 @@ class GraphVecEnv(SwarmVecEnv):
         owners = [np.arange(size, dtype=np.int32) for size in sizes]
         self._owner = np.concatenate(owners)[:, None]
         self._is_robot = np.arange(self.num_nodes) < np.array(sizes)[:, None]
+        # What each robot remembers, row by row; None unless the network has a memory.
+        self.memory: np.ndarray | None = None
+        self.recalls: Callable[[], np.ndarray] | None = None  # asks what the network remembers now
+        memory_size = 0
+        if training.own_network:
+            memory_size = empty_network(training.network, training.own_network).memory_size
+        if memory_size:
+            self.memory = np.zeros((sum(sizes), memory_size), np.float32)
+        ends = np.cumsum([batch.num_missions * batch.shape[1] for batch in self.batches]).tolist()
+        starts = [0, *ends[:-1]]
+        self._rows = [slice(*each) for each in zip(starts, ends, strict=True)]  # of each batch
         seen = {name: self._space_of(rows) for name, rows in self._observe().items()}
         if self.agent == "robot":
             action = spaces.Discrete(self.num_nodes)
@@ -65,6 +78,8 @@ class GraphVecEnv(SwarmVecEnv):
         """Start the missions under way over; others would shift the seeds of all that follow."""
         for batch in self.batches:
             batch.restart(batch.seeds, batch.last_window)
+        if self.memory is not None:
+            self.memory[:] = 0.0
         return self._observe()
 
     def replay(
@@ -81,7 +96,16 @@ class GraphVecEnv(SwarmVecEnv):
                 batch.fly(recipient)
         return self._observe()
 
+    def step_wait(self) -> VecEnvStepReturn:
+        """Fly one window; robots remember what they did when they decided on it."""
+        if self.memory is not None and self.recalls is not None:
+            remembered = self.recalls()
+            self.memory[:] = remembered if self.agent == "robot" else remembered[self._is_robot]
+        return super().step_wait()
+
     def _begin(self, n: int) -> None:
+        if self.memory is not None:
+            self.memory[self._rows[n]] = 0.0
         self.batches[n].restart(self._draw_seeds(self.batches[n]), self._num_windows)
 
     def _draw_seeds(self, batch: MissionBatch) -> list[int]:
@@ -99,6 +123,8 @@ class GraphVecEnv(SwarmVecEnv):
     def _observe(self) -> Observation:
         """Return the graphs of all robots, per team stacked with those of robots that are not."""
         rows_of = padded([batch.graphs for batch in self.batches], self.num_nodes)
+        if self.memory is not None:
+            rows_of["memory"] = self.memory.copy()
         if self.agent == "robot":
             return {**rows_of, "owner": self._owner}
         observation = {"is_robot": self._is_robot}

@@ -37,7 +37,7 @@ from swarm_mj.learning.settings import (
 )
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
-from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.gnn.policy import GnnPolicy
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import make_policy
@@ -79,7 +79,7 @@ class Flights:
             self.on_window(self.num_windows / in_all)
 
 
-def held_out_policy(training: Training, network: AggregationGnn, mission: Mission) -> GnnPolicy:
+def held_out_policy(training: Training, network: Network, mission: Mission) -> GnnPolicy:
     """Return the policy under training, as it flies."""
     extractor = make_extractor(training.features, mission)
     return GnnPolicy(network, extractor, silence_logit=training.silence_logit)
@@ -87,7 +87,7 @@ def held_out_policy(training: Training, network: AggregationGnn, mission: Missio
 
 def evaluate(
     training: Training,
-    network: AggregationGnn,
+    network: Network,
     references: References | None = None,
     on_window: OnWindow = lambda _share: None,
 ) -> tuple[HeldOutCosts, Columns]:
@@ -119,7 +119,7 @@ def evaluate(
 
 
 def fly_references(training: Training, on_window: OnWindow) -> References:
-    """Fly `REFERENCES` on the held-out missions, the same as all evaluations; return their costs."""
+    """Fly `REFERENCES` on the held-out missions, as all evaluations do; return their costs."""
     references: References = {}
     names = selection.references_flown(training)
     flights = Flights(training=training, on_window=on_window, total=len(names))
@@ -142,7 +142,7 @@ def reference_columns(references: References) -> Columns:
 def choose(
     training: Training,
     curve: Sequence[CurveRow],
-    networks: Mapping[int, AggregationGnn],  # the candidates', by the decisions behind them
+    networks: Mapping[int, Network],  # the candidates', by the decisions behind them
     on_window: OnWindow,
 ) -> tuple[Choice, HeldOutCosts]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
@@ -202,9 +202,7 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
     }
 
 
-def record_replay(
-    training: Training, network: AggregationGnn, decisions: int, folder: Path
-) -> None:
+def record_replay(training: Training, network: Network, decisions: int, folder: Path) -> None:
     """Record the first held-out mission, as the network flies it after this many team decisions."""
     from swarm_mj.replay.write import write_replay  # rerun is slow to import
 

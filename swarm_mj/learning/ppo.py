@@ -17,9 +17,10 @@ from torch import Tensor
 
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import Device, PpoSettings, Training
-from swarm_mj.policies.gnn.decisions import recipient_logits
-from swarm_mj.policies.gnn.fast import FastAggregationGnn, empty_network
-from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.decisions import evaluated, recipient_logits
+from swarm_mj.policies.gnn.fast import FastAggregationGnn
+from swarm_mj.policies.gnn.network import Network
+from swarm_mj.policies.gnn.own_networks import empty_network, make_network
 from swarm_mj.policies.learned import sample
 
 CPU = torch.device("cpu")
@@ -64,7 +65,8 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
     torch.set_num_threads(training.threads)  # sums that are divided among them round differently
     ppo = training.ppo
     drops = training.drops_silence
-    env: VecEnv = GraphVecEnv(training, np.random.default_rng(training.seed))
+    graphs = GraphVecEnv(training, np.random.default_rng(training.seed))
+    env: VecEnv = graphs
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
     with warnings.catch_warnings():
@@ -90,6 +92,8 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
             rollout_buffer_kwargs={"silent_share": ppo.silent_share} if drops else None,
             policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
+    if graphs.memory is not None:
+        graphs.recalls = policy_of(model).recalled
     model.optimises_on = optimising_device(device)
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
@@ -132,22 +136,29 @@ class GnnActorCritic(ActorCriticPolicy):
     def __init__(self, *given: Any, training: Training, **others: Any) -> None:
         self._training = training
         self._shape = training.network
+        self._remembered: Tensor | None = None
         super().__init__(*given, **others)  # spaces and the rate's schedule come from PPO
 
     def _build(self, lr_schedule: Schedule) -> None:
         num_outputs = self._shape.num_outputs
         if self._training.shares_trunk:
             num_outputs += 1  # the last one is the value, so the others keep their places
-        self.network = FastAggregationGnn(replace(self._shape, num_outputs=num_outputs))
+        own = self._training.own_network
+        self.network = make_network(replace(self._shape, num_outputs=num_outputs), own)
         if not self._training.shares_trunk:
             self.value_network = FastAggregationGnn(replace(self._shape, num_outputs=1))
         self.optimizer = torch.optim.Adam(
             self.parameters(), lr=lr_schedule(1.0), foreach=True, **self.optimizer_kwargs
         )
 
-    def acting_network(self) -> AggregationGnn:
+    def recalled(self) -> Float[np.ndarray, "E *robots H"]:
+        """Return what robots remember since their last decision."""
+        assert self._remembered is not None
+        return self._remembered.numpy()
+
+    def acting_network(self) -> Network:
         """Return a copy of the network that acts, without what values."""
-        network = empty_network(self._shape)
+        network = empty_network(self._shape, self._training.own_network)
         weights: dict[str, Tensor] = {}
         for name, tensor in self.network.state_dict().items():
             if name in ("output.weight", "output.bias"):
@@ -156,7 +167,7 @@ class GnnActorCritic(ActorCriticPolicy):
         network.load_state_dict(weights, assign=True)
         return network.requires_grad_(False)
 
-    def take_acting_network(self, given: AggregationGnn) -> None:
+    def take_acting_network(self, given: Network) -> None:
         """Begin with another network's weights; its shape is this one's."""
         own = self.network.state_dict()
         with torch.no_grad():
@@ -170,7 +181,10 @@ class GnnActorCritic(ActorCriticPolicy):
         node = obs["node"].flatten(0, -3)
         parent = obs["parent"].long().flatten(0, -2)
         may_address = obs["may_address"].bool().flatten(0, -2)
-        output = self.network(node, parent, may_address)
+        memory = obs["memory"].flatten(0, -2) if "memory" in obs else None
+        output, memory = evaluated(self.network, node, parent, may_address, owner, memory)
+        if memory is not None:
+            self._remembered = memory.detach().view(obs["memory"].shape)
         if self._training.shares_trunk:
             # The value is the last number of each node.
             output, value = output.split([self._shape.num_outputs, 1], dim=2)

@@ -142,7 +142,8 @@ class Training:
         robots: Sizes of the team, from 2 to `MAX_ROBOTS`; several are trained on together.
         features: What the network sees of each teammate: the name of a feature set, or
             `module:Name`.
-        network: The layers of the network that acts.
+        own_network: The class of the network, `module:Name`, if it is a user's own.
+        network: The layers of the network that acts; an own one takes what it likes of them.
         shares_trunk: Whether values are one more output of the same network.
         silence_logit: Added to the logit of silence, except in a robot's own turn.
         reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
@@ -185,6 +186,15 @@ class Training:
         f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
         "your own",
         reads=files_named,
+    )
+    own_network: str = setting(
+        "",
+        "a network of your own in place of the paper's; it may remember what it saw",
+        label="network",
+        flag="--network",
+        metavar="module:Name",
+        reads=files_named,
+        shown="the paper's",
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network
@@ -256,8 +266,10 @@ class Training:
     @property
     def own(self) -> dict[str, str]:
         """The names of parts that are a user's own: to go on with them is to run their code."""
-        features = {"features": self.features} if is_own_set(self.features) else {}
-        return features | self.components.names
+        names = {"features": self.features} if is_own_set(self.features) else {}
+        if self.own_network:
+            names["network"] = self.own_network
+        return names | self.components.names
 
     @property
     def own_options(self) -> str:

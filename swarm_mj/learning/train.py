@@ -2,7 +2,7 @@
 
 import math
 import time
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from dataclasses import asdict
 from functools import partial
 from pathlib import Path
@@ -14,6 +14,7 @@ from stable_baselines3.common.logger import configure
 
 from swarm_mj.learning import checkpoint, held_out, run_folder, selection
 from swarm_mj.learning.graph_vec_env import env_of
+from swarm_mj.learning.loggers import Guarded, Logger
 from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import (
@@ -37,7 +38,13 @@ OPTIMISER = [
 
 
 def train(
-    run: TrainingRun, folder: Path, *, listener: Listener, is_resumed: bool = False
+    run: TrainingRun,
+    folder: Path,
+    *,
+    listener: Listener,
+    is_resumed: bool = False,
+    logger: Logger | None = None,
+    complain: Callable[[str], object] | None = None,
 ) -> Progress:
     """Train until a limit, or until the listener returns False.
 
@@ -48,6 +55,9 @@ def train(
         listener: It gets a status after every window, and returns whether to go on.
         is_resumed: Whether to go on from the folder's checkpoint. A run that did not get so far
             starts over.
+        logger: It gets the settings and every evaluation of this session, and does not end the run
+            if it fails.
+        complain: It hears of such a failure; by default it is a warning.
 
     Returns:
         Where the run stands: its decisions, minutes and learning curve.
@@ -66,12 +76,15 @@ def train(
     check_folder(folder)
     with owned(folder / SETTINGS):
         check_folder(folder)  # a run may have begun, or come further, meanwhile
-        session = TrainingSession(run, folder, listener)
+        guarded = Guarded(logger, complain)
+        session = TrainingSession(run, folder, listener, guarded)
+        guarded.start(asdict(run), folder)
         try:
             session.learn()
             session.choose()
         finally:
             session.ppo.logger.close()
+            guarded.finish()
     return session.progress
 
 
@@ -82,13 +95,14 @@ class Stopped(Exception):  # noqa: N818 - nothing went wrong
 class TrainingSession(BaseCallback):
     """One session of a run; PPO calls it after every window of a rollout."""
 
-    def __init__(self, run: TrainingRun, folder: Path, listener: Listener) -> None:
+    def __init__(self, run: TrainingRun, folder: Path, listener: Listener, logger: Guarded) -> None:
         """Take a run to its last checkpoint, or else to its beginning; then it can be resumed."""
         super().__init__()
         self._run = run
         self._training = run.training
         self._folder = folder
         self._listener = listener
+        self._own_logger = logger
         self.ppo = make_model(run.training, run.device)
         self._env = env_of(self.ppo)
         self._aoi = math.nan
@@ -105,7 +119,8 @@ class TrainingSession(BaseCallback):
             path = own if own.exists() else run.init
             init = read_policy(path)
             _, config = init
-            if config.network != run.training.network:
+            its = (config.network, config.own_network)
+            if its != (run.training.network, run.training.own_network):
                 whose = "the run that begins with it"
                 raise ValueError(f"policy {path} has another network than {whose}")
         run_folder.write_run(folder, run)
@@ -250,6 +265,7 @@ class TrainingSession(BaseCallback):
         for name, value in evaluation.columns().items():
             self.logger.record(name if "/" in name else f"held_out/{name}", value)
         self.logger.dump(decisions)
+        self._own_logger.log(evaluation.columns(), decisions)
         progress.write_curve(self._folder / CURVE)
         self._networks[decisions] = network
         kept = {row.decisions for row in selection.candidates(progress.curve)}
@@ -287,6 +303,7 @@ class TrainingSession(BaseCallback):
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,
+            own_network=training.own_network,
             training=asdict(training) | made,
             evaluation={"aoi_sem": costs.aoi_sem}
             | asdict(costs)

@@ -12,6 +12,7 @@ class PolicyArguments:
     probability: float | None = None
     is_deterministic: bool = False  # whether a learned policy takes the most probable recipient
     features: Sequence[str] = ()  # users' own feature sets that a learned policy may import
+    networks: Sequence[str] = ()  # users' own networks, likewise
 
 
 USUAL = PolicyArguments()  # every policy as it is made by its name alone

@@ -108,10 +108,12 @@ class GnnConfig(PolicyConfig):
     network: GnnShape
     features: str  # the name of a feature set, see `FEATURE_SETS`
     silence_logit: float = setting(0.0, low=-100.0, high=100.0)  # added, but in one's own turn
+    own_network: str = ""  # the name of its class, as `module:Name`, if it is a user's own
 
     def __post_init__(self) -> None:
         check(self)
         check_fit(self.network, self.features)
+        check_printable(self.own_network, "write it without them")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -154,6 +156,9 @@ def model_card(config: GnnConfig | MlpConfig) -> str:
         kind = "perceptrons"
         teams = f"It flies teams of {config.network.num_robots} robots only."
         flags.append(f"--robots {config.network.num_robots}")
+    if isinstance(config, GnnConfig) and config.own_network:
+        kind = f"a network, `{config.own_network}`,"
+        flags.append(f"--network {config.own_network}")
     if is_own_set(config.features):
         flags.append(f"--features {config.features}")
     return f"""\

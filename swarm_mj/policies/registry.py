@@ -121,6 +121,7 @@ def make_policy(
     *,
     is_deterministic: bool = False,
     features: Sequence[str] = (),
+    networks: Sequence[str] = (),
 ) -> Policy:
     """Return a policy by its name, for a mission.
 
@@ -135,6 +136,7 @@ def make_policy(
             the one tuned for the regime nearest to the mission's.
         is_deterministic: Whether a learned policy takes the most probable recipient, not a draw.
         features: Own feature sets, as `module:Name`, that may be imported for a learned policy.
+        networks: Own networks, likewise.
 
     Returns:
         The policy, to be started with the mission's swarm.
@@ -154,6 +156,7 @@ def make_policy(
         probability=probability,
         is_deterministic=is_deterministic,
         features=features,
+        networks=networks,
     )
     return make_policy_with(arguments, name, mission)
 
@@ -200,6 +203,7 @@ def _learned(arguments: PolicyArguments, name: str, mission: Mission) -> Policy:
         mission,
         is_deterministic=arguments.is_deterministic,
         features=arguments.features,
+        networks=arguments.networks,
     )
     if name == SHIPPED:
         policy.about = SHIPPED_GNN
@@ -294,12 +298,18 @@ def with_payload(names: Sequence[str], payload: str) -> list[str]:
     return [VARIANTS.get(name, name) for name in names]
 
 
-def check_used(features: Sequence[str], policies: Iterable[Policy]) -> None:
-    """Raise ValueError unless own feature sets that were named are those of some policy."""
+def check_used(
+    features: Sequence[str], networks: Sequence[str], policies: Iterable[Policy]
+) -> None:
+    """Raise ValueError unless own features and networks that were named are those of a policy."""
     used: set[object] = set()
     for policy in policies:
         check_parameters(policy)  # they may be of a user's own, and anything
         used.add(policy.parameters.get("features"))
+        used.add(policy.parameters.get("network"))
     for name in features:
         if name not in used:
             raise ValueError(f"no policy here was trained on the features {name}; leave them out")
+    for name in networks:
+        if name not in used:
+            raise ValueError(f"no policy here decides by the network {name}; leave it out")

@@ -27,7 +27,7 @@ from swarm_mj.system.reading import check_size, open_file, read_document, read_p
 from swarm_mj.system.writing import write_bytes
 
 if TYPE_CHECKING:  # policies are loaded without torch, which takes seconds to import
-    from swarm_mj.policies.gnn.network import AggregationGnn
+    from swarm_mj.policies.gnn.network import Network
 
 POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
 FORMAT = "swarm_mj policy"  # and the metadata's entry
@@ -57,9 +57,7 @@ class _Metadata:
         return features if isinstance(features, str) else ""
 
 
-def save_gnn(
-    path: Path, network: "AggregationGnn", config: GnnConfig, card: str | None = None
-) -> Path:
+def save_gnn(path: Path, network: "Network", config: GnnConfig, card: str | None = None) -> Path:
     """Store a GNN whole or not at all.
 
     Args:
@@ -91,7 +89,7 @@ def save_weights(
 ) -> Path:
     """Store a policy's weights by name, as `save_gnn` does; it returns and raises the same."""
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
-    _check_tensors(config.network.tensors, weights)
+    _check_weights(config, weights)
     said = {
         "format": FORMAT,
         "format_version": VERSION,
@@ -109,7 +107,12 @@ def save_weights(
 
 
 def load_policy(
-    path: Path, mission: Mission, *, is_deterministic: bool = False, features: Sequence[str] = ()
+    path: Path,
+    mission: Mission,
+    *,
+    is_deterministic: bool = False,
+    features: Sequence[str] = (),
+    networks: Sequence[str] = (),
 ) -> LearnedPolicy:
     """Return a stored policy, ready to fly.
 
@@ -120,14 +123,15 @@ def load_policy(
         is_deterministic: Whether robots take the most probable recipient instead of a draw.
         features: Users' own feature sets, as `module:Name`, that may be imported. A policy names
             the one it was trained on, but only the user can make us run code.
+        networks: Users' own networks, as `module:Name`, likewise.
 
     Returns:
         The policy; a graph neural network imports torch when it flies first.
 
     Raises:
         ValueError: There is no policy; it is damaged, foreign, oversized or of a newer version; it
-            flies teams of another size; its features are a user's own and not among `features`; or
-            they are other ones now, or in another order, than it was trained on.
+            flies teams of another size; its features are a user's own and not among `features`, nor
+            its network among `networks`; or they are other ones now than it was trained on.
         ModuleNotFoundError: It is a graph neural network, and torch is not installed.
         OSError: It cannot be read.
 
@@ -165,8 +169,9 @@ def load_policy(
             own_features=own,
         )
     need("torch", f"policy {path}", "fly another")
+    _load_network(config, weights, networks, path)
     return GnnPolicy(
-        StoredGnn(shape=config.network, weights=weights),
+        StoredGnn(shape=config.network, weights=weights, own=config.own_network),
         extractor,
         config.silence_logit,
         is_deterministic=is_deterministic,
@@ -174,17 +179,38 @@ def load_policy(
     )
 
 
-def read_policy(path: Path) -> tuple["AggregationGnn", GnnConfig]:
+def _load_network(
+    config: GnnConfig, weights: Weights, networks: Sequence[str] | None, path: Path
+) -> None:
+    """Load a policy's network if it is a user's own; raise ValueError if it may not be, or differs.
+
+    None are the networks that this process has loaded.
+    """
+    own = config.own_network
+    if not own:
+        return
+    from swarm_mj.policies.gnn import own_networks  # torch is slow to import
+
+    if networks is not None:
+        own_networks.check_named(own, networks, f"policy {path}")
+        own_networks.load_network(own)
+    with _as_unsound(path):
+        _check_tensors(own_networks.tensors_of(config.network, own), weights)
+
+
+def read_policy(path: Path) -> tuple["Network", GnnConfig]:
     """Return a GNN, with its weights, and its config.
 
-    Raises errors as `read_weights` does, and ValueError for a policy that is no GNN.
+    A network of a user's own must have been loaded, by `own_networks.load_network`. Raises errors
+    as `read_weights` does, and ValueError for a policy that is no GNN.
     """
     weights, config = read_weights(path)
     if not isinstance(config, GnnConfig):
         raise ValueError(f"policy {path} is a plain network; name one that `swarm-mj train` made")
-    from swarm_mj.policies.gnn.fast import network_of
+    from swarm_mj.policies.gnn.own_networks import network_of
 
-    return network_of(config.network, weights), config
+    _load_network(config, weights, None, path)
+    return network_of(config.network, weights, config.own_network), config
 
 
 def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
@@ -210,7 +236,7 @@ def _read(path: Path) -> tuple[Weights, GnnConfig | MlpConfig, tuple[str, ...]]:
     feature_sets.check_unchanged(said.feature_set, said.feature_names, f"policy {place}")
     with _as_unsound(place):
         config = read_plain(said.config, CONFIGS[said.kind])
-        _check_tensors(config.network.tensors, weights)
+        _check_weights(config, weights)
     return weights, config, said.feature_names
 
 
@@ -247,6 +273,16 @@ def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
     # The last two: no type of NumPy's.
     except (SafetensorError, AttributeError, TypeError) as error:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
+
+
+def _check_weights(config: GnnConfig | MlpConfig, weights: Weights) -> None:
+    """Raise ValueError unless weights are a config's, as far as is known without running code."""
+    if isinstance(config, GnnConfig) and config.own_network:
+        # Their shapes only the code of its user knows.
+        shapes = {name: tensor.shape for name, tensor in weights.items()}
+        _check_tensors(shapes, weights)
+    else:
+        _check_tensors(config.network.tensors, weights)
 
 
 def _check_tensors(shapes: dict[str, tuple[int, ...]], tensors: Weights) -> None:

@@ -212,9 +212,30 @@ def test_a_channel_of_ones_own_gives_a_mission_the_same_course_beside_any_other(
     np.testing.assert_array_equal(*ages)
 
 
+NETWORK = """
+from pathlib import Path
+
+import torch
+from torch import nn
+
+from swarm_mj.policies.gnn.network import Network
+
+with Path("imported.txt").open("a") as file:
+    file.write("once more\\n")
+
+class Two(Network):
+    memory_size = 1
+    def __init__(self, shape):
+        super().__init__(shape)
+        self.output = nn.Linear(shape.num_features + 1, shape.num_outputs)
+    def remember(self, node, parent, owner, memory):
+        return memory + node[:, :, 0].mean(dim=1, keepdim=True)
+    def forward(self, node, parent, is_wanted=None, memory=None):
+        return self.output(torch.cat([node, memory[:, None] * node[:, :, :1]], dim=2))
+"""
 TRAIN = ("train", "--robots", 5, "--windows", 10, "--range-ratio", 0.6, "--missions", 4)
 TRAIN = (*TRAIN, "--held-out", 2, "--evaluate-every", 128, "--latent", 6, "--depth", 2)
-OWN = ("--channel", "my_parts:Lossy", "--features", "my_parts:Ages")
+OWN = ("--channel", "my_parts:Lossy", "--features", "my_parts:Ages", "--network", "my_network:Two")
 
 
 @pytest.fixture(scope="module")
@@ -222,6 +243,7 @@ def trained(forks, tmp_path_factory):
     """A folder with the parts, a run that was trained with them, and half of such a run."""
     folder = tmp_path_factory.mktemp("own")
     (folder / "my_parts.py").write_text(PARTS)
+    (folder / "my_network.py").write_text(NETWORK)
     for out, budget in (("run", 128), ("w", 256)):
         done = forks.run(folder, "swarm_mj", *TRAIN, *OWN, "--out", out, "--budget", budget)
         assert done.returncode == 0, done.stderr
@@ -244,7 +266,10 @@ def typed(forks, trained):
 def test_a_run_goes_on_bit_for_bit_if_its_parts_are_named_again(typed, trained):
     code, complaint, was_imported = typed("train", "--out", "run", "--resume", "--budget", 256)
     assert (code, was_imported) == (2, False)
-    assert "--features my_parts:Ages --channel my_parts:Lossy again" in complaint
+    assert (
+        "--features my_parts:Ages --network my_network:Two --channel my_parts:Lossy again"
+        in complaint
+    )
     ended = typed("train", "--out", "run", "--resume", "--budget", 256, *OWN)
     assert (ended[0], ended[2]) == (0, True), ended
     curves = []
@@ -266,13 +291,18 @@ def test_a_policys_features_are_loaded_only_if_its_user_names_them(typed):
     code, complaint, was_imported = typed(*FLY)
     assert (code, was_imported) == (2, False)
     assert "add --features my_parts:Ages" in complaint
-    assert typed(*FLY, "--features", "my_parts:Ages") == (0, "", True)
+    code, complaint, _ = typed(*FLY, "--features", "my_parts:Ages")
+    assert code == 2
+    assert "add --network my_network:Two" in complaint
+    both = ("--features", "my_parts:Ages", "--network", "my_network:Two")
+    assert typed(*FLY, *both) == (0, "", True)
 
 
 @pytest.mark.parametrize(
     "arguments",
     [
         (*FLY, "--features", "my_parts:Other"),
+        (*FLY, "--network", "my_network:Two"),
         ("evaluate", "--policy", "w", "--robots", 5, "--episodes", 1),
         ("train", "--init", "w", "--out", "next", "--robots", 5),
         ("policies", "w"),
@@ -288,6 +318,7 @@ def test_a_folder_never_names_what_is_imported(typed, arguments):
 def test_an_evaluation_loads_them_in_every_process(typed):
     ended = typed(
         *("evaluate", "--policy", "w", "tdma", "--features", "my_parts:Ages"),
+        *("--network", "my_network:Two"),
         *("--robots", 5, "--windows", 10, "--episodes", 2, "--jobs", 2),
     )
     assert (ended[0], ended[2]) == (0, True), ended

@@ -8,9 +8,10 @@ import torch
 from torch.distributions import Categorical
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import draw, make_model
+from swarm_mj.learning.ppo import draw, make_model, policy_of
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import PRESETS
+from swarm_mj.policies.gnn.own_networks import load_network
 
 RUNS = [
     (credit, preset, sizes)
@@ -165,3 +166,46 @@ def test_the_acting_network_is_a_copy_of_what_acts(credit):
         for weight in model.policy.network.parameters():
             weight.zero_()
     assert all(torch.any(weight != 0.0) for weight in copied.parameters())
+
+
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_robots_remember_in_training_as_they_do_in_flight(credit):
+    """By `Counting`: windows since the mission began, and who a robot is; others pad teams."""
+    name = "tiny_networks:Counting"
+    load_network(name)
+    mission = PRESETS["paper"]("random-walk", num_robots=5, num_windows=4, range_ratio=0.6)
+    training = replace(
+        usual_settings(credit, mission, (3, 5), seed=1), missions=4, groups=4, own_network=name
+    )
+    model = make_model(training)
+    env = env_of(model)
+    observation = model.get_env().reset()
+    windows = np.zeros(4)  # since each batch began
+    for _ in range(7):
+        memory = observation["memory"]
+        for n, (batch, count) in enumerate(zip(env.batches, windows, strict=True)):
+            size = batch.shape[1]
+            rows = memory[n, :size] if credit == "team" else memory[env._envs[n]]
+            robots = range(size) if count else [0] * size
+            assert rows.tolist() == [[count, robot] for robot in robots]
+        actions, _ = model.predict(observation)
+        observation, _, done, _ = env.step(actions)
+        ended = [bool(done[envs].any()) for envs in env._envs]
+        windows = np.where(ended, 0, windows + 1)
+    assert windows.min() < windows.max()
+
+
+def test_a_network_of_ones_own_acts_as_in_training_without_its_value():
+    load_network("tiny_networks:Counting")
+    mission = PRESETS["paper"]("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)
+    usual = usual_settings("robot", mission, (5,), seed=1)
+    training = replace(usual, missions=4, own_network="tiny_networks:Counting")
+    model = make_model(training)
+    acting = policy_of(model).acting_network()
+    trained = policy_of(model).network
+    assert trained.output.out_features == acting.output.out_features + 1 == 2
+    node, parent = torch.randn(5, 5, 18), torch.full((5, 5), -1)
+    memory = acting.remember(node, parent, torch.arange(5), torch.zeros(5, 2))
+    numbers = acting(node, parent, None, memory)
+    torch.testing.assert_close(numbers, trained(node, parent, None, memory)[..., :1])
+    policy_of(model).take_acting_network(acting)

@@ -27,6 +27,7 @@ from swarm_mj.learning.held_out import fly_references
 from swarm_mj.learning.selection import Progress
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.own_networks import load_network
 from swarm_mj.policies.learned import sample
 
 pytestmark = pytest.mark.slow  # `cli/test_own_parts.py` holds the law once
@@ -35,12 +36,15 @@ RESUMED = {
     "robot, discounted": {"discount": 0.9},
     "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},
     "team, two sizes": {"credit": "team", "sizes": (4, 6)},
+    "robot, two sizes, with a memory": {"sizes": (4, 6), "own_network": "tiny_networks:Counting"},
     "team, for the flock": {"credit": "team", "task": "flocking", "reward": "velocity-variance"},
 }
 
 
 def resumed(folder):
     """How runs that were interrupted twice differ from those that were not, by name."""
+    sys.path.append(str(Path(__file__).parents[1]))
+    load_network("tiny_networks:Counting")
     return {name: _interrupted_twice(folder / name, asked) for name, asked in RESUMED.items()}
 
 

@@ -8,7 +8,7 @@ from dataclasses import asdict, replace
 import pytest
 from tiny_policies import FEATURES, tiny_config, tiny_network
 
-from swarm_mj.policies.gnn.fast import empty_network
+from swarm_mj.policies.gnn.own_networks import empty_network
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape, MlpConfig, MlpShape, model_card
 from swarm_mj.system.reading import read_json
 

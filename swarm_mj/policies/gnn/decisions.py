@@ -6,33 +6,75 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from swarm_mj.policies.gnn.graphs import Graphs
-from swarm_mj.policies.gnn.network import AggregationGnn
+from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.learned import IMPOSSIBLE
 
 
 def network_logits(
-    network: AggregationGnn, graphs: Graphs, silence_logit: float
-) -> Float[np.ndarray, "R N"]:
-    """Return each robot's logits over recipients, row by row, from its own graph."""
+    network: Network,
+    graphs: Graphs,
+    silence_logit: float,
+    memory: Float[np.ndarray, "R H"] | None = None,
+) -> tuple[Float[np.ndarray, "R N"], Float[np.ndarray, "R H"] | None]:
+    """Return each robot's logits over recipients, row by row, from its own graph.
+
+    And what it remembers from now on, if it remembers anything: `memory` is of before.
+    """
     num_rows, num_robots = graphs.may_address.shape
     node = torch.from_numpy(graphs.node)
     parent = torch.from_numpy(graphs.parent.astype(np.int64))  # a copy: buffers are read-only
     may_address = torch.from_numpy(graphs.may_address)
+    owner = torch.arange(num_rows) % num_robots
     device = next(network.parameters()).device
     num_threads = torch.get_num_threads()
     torch.set_num_threads(1)  # small batches are slower on several
     try:
         with torch.inference_mode():
-            output = network(node.to(device), parent.to(device), may_address.to(device))
-            return recipient_logits(
+            remembered = None if memory is None else torch.from_numpy(memory).to(device)
+            seen = (node.to(device), parent.to(device))
+            output, remembered = evaluated(
+                network, *seen, may_address.to(device), owner.to(device), remembered
+            )
+            logits = recipient_logits(
                 output.cpu(),
-                owner=torch.arange(num_rows) % num_robots,
+                owner=owner,
                 may_address=may_address,
                 silence_logit=silence_logit,
                 has_turn=torch.from_numpy(graphs.has_turn),
             ).numpy()
+            return logits, None if remembered is None else remembered.cpu().numpy()
     finally:
         torch.set_num_threads(num_threads)  # the setting is the process's
+
+
+def evaluated(
+    network: Network,
+    node: Float[Tensor, "R N F"],
+    parent: Int[Tensor, "R N"],
+    is_wanted: Bool[Tensor, "R N"],
+    owner: Int[Tensor, "R"],
+    memory: Float[Tensor, "R H"] | None,
+) -> tuple[Float[Tensor, "R N O"], Float[Tensor, "R H"] | None]:
+    """Return a network's numbers for each node, and what robots remember from now on, if anything.
+
+    Raises ValueError if a network of a user's own returns other shapes.
+    """
+    if memory is None:
+        output = network(node, parent, is_wanted)
+    else:
+        before = memory.shape
+        memory = network.remember(node, parent, owner, memory)
+        _check_shape(network, "remember", memory, tuple(before))
+        output = network(node, parent, is_wanted, memory)
+    _check_shape(network, "forward", output, (*parent.shape, network.shape.num_outputs))
+    return output, memory
+
+
+def _check_shape(network: Network, what: str, found: object, shape: tuple[int, ...]) -> None:
+    its = tuple(found.shape) if isinstance(found, Tensor) else type(found).__name__
+    if its != shape:
+        name = type(network).__name__
+        raise ValueError(f"{name}.{what} must return a tensor of shape {shape}, not {its}")
 
 
 def recipient_logits(

@@ -12,7 +12,7 @@ are asked for go through the last layers.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -22,7 +22,6 @@ from torch import Tensor, nn
 
 from swarm_mj.policies.gnn.edge_sums import EdgeMeans, as_array, edges_to
 from swarm_mj.policies.gnn.network import AggregationGnn, edges_of, mean_aggregation
-from swarm_mj.policies.policy_config import GnnShape
 
 NODES_AT_ONCE = 6400  # on a CPU: with more the caches spill, with fewer every step starts in vain
 IS_UPWARD = {"paper": (True,), "reference": (False,), "both": (True, False)}  # child to parent
@@ -36,9 +35,14 @@ class FastAggregationGnn(AggregationGnn):
     """An `AggregationGnn` that composes layers and leaves out what nobody asks for."""
 
     def forward(
-        self, node: Float[Tensor, "R N F"], parent: Parents, is_wanted: Asked | None = None
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Parents,
+        is_wanted: Asked | None = None,
+        memory: Float[Tensor, "R H"] | None = None,
     ) -> Float[Tensor, "R N O"]:
         """As `AggregationGnn.forward`, to which the linear variant and a depth of 1 are left."""
+        del memory
         self.check(node, parent)
         evaluate = self.form(node.device)
         num_chunks = 1
@@ -68,20 +72,6 @@ class FastAggregationGnn(AggregationGnn):
         if shape.receptive_field == 1 and shape.depth == 2 and device.type == "cpu":
             return OneBlock(self)
         return AllBlocks(self)
-
-
-def empty_network(shape: GnnShape) -> FastAggregationGnn:
-    """Return a network without weights: it takes no memory, and draws no random numbers."""
-    with torch.device("meta"):
-        return FastAggregationGnn(shape)
-
-
-def network_of(shape: GnnShape, weights: Mapping[str, np.ndarray]) -> FastAggregationGnn:
-    """Return a network with these weights, which are its own."""
-    network = empty_network(shape)
-    tensors = {name: torch.from_numpy(array) for name, array in weights.items()}
-    network.load_state_dict(tensors, assign=True)
-    return network
 
 
 class Layer(NamedTuple):

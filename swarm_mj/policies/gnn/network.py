@@ -102,13 +102,67 @@ def gn_block(
     return node, edge
 
 
-class AggregationGnn(nn.Module):
+class Network(nn.Module):
+    """A network that decides: the features of the nodes of R graphs in, numbers for each node out.
+
+    `AggregationGnn` is the paper's. A subclass of yours trains, is stored and flies as `--network
+    module:Name`. It is made with a `GnnShape` alone, and its last layer, `self.output`, must be a
+    `torch.nn.Linear` to `shape.num_outputs` numbers. What it computes for a robot may depend on
+    that robot's graph only, and on its memory.
+
+    A robot remembers `memory_size` numbers from one window to the next, at first zeros. Before each
+    decision `remember` returns them anew, and `forward` gets them as its last argument. Gradients
+    reach one update back: what is to be learned over several windows, a memory must hold.
+    """
+
+    memory_size: int = 0  # H: numbers that each robot remembers; 0, as in the paper, is none
+
+    def __init__(self, shape: GnnShape) -> None:
+        """Take what there is to know of its inputs, outputs and layers."""
+        super().__init__()
+        self.shape = shape
+
+    def forward(
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        is_wanted: Bool[Tensor, "R N"] | None = None,
+        memory: Float[Tensor, "R H"] | None = None,
+    ) -> Float[Tensor, "R N O"]:
+        """Return numbers for each node.
+
+        Args:
+            node: The features of each node.
+            parent: A node of the same graph, or -1 for none: the edges.
+            is_wanted: Nodes whose numbers count; None is all.
+            memory: What each robot remembers now; None of a network without a memory.
+        """
+        raise NotImplementedError
+
+    def remember(
+        self,
+        node: Float[Tensor, "R N F"],
+        parent: Int[Tensor, "R N"],
+        owner: Int[Tensor, "R"],
+        memory: Float[Tensor, "R H"],
+    ) -> Float[Tensor, "R H"]:
+        """Return what each robot remembers from now on.
+
+        Args:
+            node: The features of each node, as `forward` gets them next.
+            parent: As above.
+            owner: Each graph's robot itself, a node.
+            memory: What it remembered before; zeros when a mission begins.
+        """
+        raise NotImplementedError
+
+
+class AggregationGnn(Network):
     """Encodes, applies the GN block K times, decodes each stage, maps all linearly (Eq. 14)."""
 
     def __init__(self, shape: GnnShape) -> None:
         """Draw the parameters from PyTorch's own generator."""
-        super().__init__()
-        self.shape = shape
+        super().__init__(shape)
         width = shape.latent
         self.encoder = Perceptrons(Perceptron(shape.num_features, shape))
         self.core: Core | None = None
@@ -123,12 +177,14 @@ class AggregationGnn(nn.Module):
         node: Float[Tensor, "R N F"],
         parent: Int[Tensor, "R N"],
         is_wanted: Bool[Tensor, "R N"] | None = None,
+        memory: Float[Tensor, "R H"] | None = None,
     ) -> Float[Tensor, "R N O"]:
-        """Map the features of the nodes of R graphs to numbers for each node.
+        """Map the features of the nodes of R graphs to numbers for each node, without a memory.
 
         `parent` is a node of the same graph, or -1: no edge, as of the nodes that pad a smaller
         graph. Of nodes that are not wanted the numbers are 0; None is all. Raises as `check`.
         """
+        del memory  # for subclasses
         self.check(node, parent)
         edges = edges_of(parent, self.shape.edges, node.dtype)
         v = self.encoder.node(node.flatten(0, 1))

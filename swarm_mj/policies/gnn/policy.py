@@ -16,7 +16,10 @@ from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.policy_config import GnnShape, Weights
 
 if TYPE_CHECKING:
-    from swarm_mj.policies.gnn.network import AggregationGnn
+    from swarm_mj.policies.gnn.network import Network
+
+
+MEMORY = "memory"  # the parameter that says how many numbers a robot remembers
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -25,6 +28,7 @@ class StoredGnn:
 
     shape: GnnShape
     weights: Weights
+    own: str = ""  # the name of its class, as `module:Name`, if it is a user's own
 
 
 class GnnPolicy(LearnedPolicy):
@@ -35,7 +39,7 @@ class GnnPolicy(LearnedPolicy):
 
     def __init__(
         self,
-        network: "AggregationGnn | StoredGnn",
+        network: "Network | StoredGnn",
         extractor: FeatureExtractor,
         silence_logit: float = 0.0,
         *,
@@ -54,36 +58,52 @@ class GnnPolicy(LearnedPolicy):
         """
         super().__init__(extractor, is_deterministic=is_deterministic, own_features=own_features)
         self._network = network
+        self._own = network.own if isinstance(network, StoredGnn) else ""
         self._silence_logit = silence_logit
+        self._memory: np.ndarray | None = None
         self.uses = f"{extractor.uses}, by a trained graph neural network"
+        if isinstance(network, StoredGnn) and network.own:
+            remembers = " and what it remembers" if self._live_network().memory_size else ""
+            self.uses = f"{extractor.uses}{remembers}, by a trained network, {network.own}"
 
     @property
     def parameters(self) -> Parameters:
-        """The receptive field as well."""
-        return {"receptive_field": self._network.shape.receptive_field, **super().parameters}
+        """The receptive field as well; of a user's own network, its name and its memory."""
+        if not self._own:
+            return {"receptive_field": self._network.shape.receptive_field, **super().parameters}
+        its: Parameters = {"network": self._own, **super().parameters}
+        memory_size = self._live_network().memory_size
+        return {**its, MEMORY: memory_size} if memory_size else its
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Make torch's network before the first window; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
-        self._live_network()
+        memory_size = self._live_network().memory_size
+        if memory_size:
+            self._memory = np.zeros((len(rngs) * num_robots, memory_size), np.float32)
 
     def logits(self, graphs: Graphs) -> Float[np.ndarray, "R N"]:
-        """Return each robot's logits over recipients, from its own graph."""
+        """Return each robot's logits over recipients, from its own graph; it may remember it."""
         from swarm_mj.policies.gnn.decisions import network_logits
 
-        return network_logits(self._live_network(), graphs, self._silence_logit)
+        network = self._live_network()
+        logits, self._memory = network_logits(network, graphs, self._silence_logit, self._memory)
+        return logits
 
     def identity(self) -> tuple[object, Weights]:
         """Return what the network is made of and sees, and its weights now."""
         made_of = (self._network.shape, self._extractor.names, self._silence_logit)
+        if self._own:
+            made_of = (*made_of, self._own)
         if isinstance(self._network, StoredGnn):
             return made_of, self._network.weights
         state = self._network.state_dict().items()
         return made_of, {name: tensor.cpu().contiguous().numpy() for name, tensor in state}
 
-    def _live_network(self) -> "AggregationGnn":
+    def _live_network(self) -> "Network":
         if isinstance(self._network, StoredGnn):
-            from swarm_mj.policies.gnn.fast import network_of
+            from swarm_mj.policies.gnn.own_networks import network_of
 
-            self._network = network_of(self._network.shape, self._network.weights)
+            stored = self._network
+            self._network = network_of(stored.shape, stored.weights, stored.own)
         return self._network
