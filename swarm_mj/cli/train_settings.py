@@ -13,9 +13,16 @@ from typing import Any
 
 from swarm_mj.cli.mission_options import FLAGS, about_option, check_in_use
 from swarm_mj.cli.options import Given, Option, flags_of
-from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
+from swarm_mj.learning.settings import TURNLESS_SILENCE, PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, Mission, make_mission
-from swarm_mj.policies.gnn.feature_sets import check_named, is_own_set, load_features, num_features
+from swarm_mj.policies.gnn.feature_sets import (
+    FEATURE_SETS,
+    check_named,
+    has_turns,
+    is_own_set,
+    load_features,
+    num_features,
+)
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.simulation.components import GROUP, Components
@@ -90,6 +97,8 @@ def asked_settings(
     load_own(own.get("features", training.features), own.get("own_network", ""), training)
     if "features" in own:
         network["num_features"] = num_features(own["features"])
+        if init is None:
+            own = _usual_silence(own, training) | own
     training = replace(
         training,
         groups=_num_groups(missions, len(sizes)),
@@ -103,6 +112,15 @@ def asked_settings(
         rule = "reward velocity-variance depends on who talks only if the robots flock"
         raise ValueError(f"{rule}; add --task flocking")
     return training
+
+
+def _usual_silence(own: Given, training: Training) -> Given:
+    """Return the logit of silence that suits features without turns, if these are such."""
+    features = own["features"]
+    is_ours = features in FEATURE_SETS  # a user's own may have turns, too
+    if training.credit_assignment == "robot" and is_ours and not has_turns(features):
+        return {"silence_logit": TURNLESS_SILENCE}
+    return {}
 
 
 def _mission(asked: Given, num_robots: int) -> Mission:

@@ -19,7 +19,8 @@ from swarm_mj.policies.stored import read_policy
 from swarm_mj.replay.read import windows
 
 MISSIONS = ("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4")
-SMALL = (*MISSIONS, "--latent", "4", "--held-out", "2", "--evaluate-every", "128")
+PPO = ("--rollout-windows", "32", "--minibatches", "10")
+SMALL = (*MISSIONS, *PPO, "--latent", "4", "--held-out", "2", "--evaluate-every", "128")
 ROLLOUT = 128  # decisions: 4 missions for 32 windows
 
 
@@ -52,6 +53,23 @@ def test_a_run_prints_its_evaluations_and_what_it_came_to(whole):
     for row in ("policy kept", "spatial-tdma", "greedy-oracle", "decisions", "minutes"):
         assert row in done.stdout
     assert "runs/whole: credit per robot, stationary, 4 robots" in done.stdout
+
+
+@pytest.mark.usefixtures("here")
+def test_a_logger_that_fails_is_said_and_the_run_ends_well(here, capsys):
+    """What it has heard before, it keeps."""
+    (here / "my_logger.py").write_text(
+        "class Mine:\n"
+        "    def start(self, settings, folder): print('started', folder, file=open('l', 'w'))\n"
+        "    def log(self, row, decisions): raise OSError('no disk')\n"
+        "    def finish(self): pass\n"
+    )
+    assert train("--out", "run", *SMALL, "--budget", 128, "--logger", "my_logger:Mine") == 0
+    assert (here / "l").read_text() == "started run\n"
+    said = capsys.readouterr().err
+    assert said.count("The logger Mine failed (OSError: no disk); the run goes on without it.") == 1
+    assert train("--out", "more", *SMALL, "--budget", 128, "--logger", "my_logger:Other") == 2
+    assert not (here / "more").exists()
 
 
 def test_a_run_leaves_what_it_says(whole):

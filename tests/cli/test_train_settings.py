@@ -11,7 +11,7 @@ from swarm_mj.cli import main, parse
 from swarm_mj.cli.train import asked_limits
 from swarm_mj.cli.train_settings import asked_settings, refuse_others
 from swarm_mj.learning.run_folder import BUDGETS, Limits
-from swarm_mj.learning.settings import usual_settings
+from swarm_mj.learning.settings import TURNLESS_SILENCE, usual_settings
 from swarm_mj.mission import paper
 
 
@@ -64,6 +64,9 @@ def test_without_options_a_run_has_the_usual_settings(credit):
         ("--edges", "reference", "network.edges"),
         ("--learning-rate", 0.5, "ppo.learning_rate"),
         ("--discount", 0.75, "ppo.discount"),
+        ("--rollout-windows", 6, "ppo.num_steps"),
+        ("--minibatches", 3, "ppo.num_minibatches"),
+        ("--train-windows", 50, "train_windows"),
         ("--threads", 2, "threads"),
         ("--task", "flocking", "mission.task"),
         ("--preset", "reference", "mission.preset"),
@@ -90,6 +93,17 @@ def test_features_bring_the_networks_inputs_along_and_presets_the_papers_way():
     code = asked("--credit", "team", "--preset", "reference")
     assert (code.features, code.network.num_outputs) == ("reference", 2)
     assert code.mission.half_duplex == "eavesdroppers"
+
+
+def test_robots_begin_less_silent_where_no_turns_let_them_speak():
+    assert asked("--features", "extended") == asked()
+    for features in ("buffer", "local", "paper"):
+        assert asked("--features", features).silence_logit == TURNLESS_SILENCE < 7.0
+        assert asked("--features", features, "--silence-logit", 7).silence_logit == 7.0
+    team = usual_settings("team", paper("stationary"), (40,))
+    assert asked("--credit", "team", "--features", "paper") == team
+    begun = tiny_config(tiny_network("buffer"), "buffer")
+    assert asked_settings(given("--features", "buffer"), begun).silence_logit == 1.5
 
 
 @pytest.mark.parametrize(

@@ -63,6 +63,12 @@ def remembers_packets(features: str) -> bool:
     return _feature_set(features).remembers_packets
 
 
+def has_turns(features: str) -> bool:
+    """Return whether a set's graphs say whose turn it is; raises as `make_extractor`."""
+    found = _feature_set(features)
+    return issubclass(found, ExtendedFeatures) and not issubclass(found, LocalFeatures)
+
+
 def known_names(features: str) -> tuple[str, ...]:
     """Return the names of a set's features, in order; none of a user's own that is not loaded."""
     known = FEATURE_SETS | _own
