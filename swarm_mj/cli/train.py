@@ -11,6 +11,7 @@ from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import Given, nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
+from swarm_mj.evaluation.engines import GROUP, EngineOptions
 from swarm_mj.learning import run_folder
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import Progress
@@ -26,7 +27,7 @@ from swarm_mj.system.writing import Output, check_outputs
 
 
 @dataclass(frozen=True, kw_only=True)
-class TrainOptions:
+class TrainOptions(EngineOptions):
     """The options of `swarm-mj train`."""
 
     EPILOG: ClassVar = (
@@ -57,6 +58,13 @@ class TrainOptions:
         metavar="module:Name",
         reads=files_named,
     )
+    sweep: Path | None = setting(
+        None,
+        "a training for each combination of values in a file, all below OUT",
+        metavar="FILE.toml",
+        reads=the_file,
+        group=GROUP,
+    )
     yes: bool = setting(False, YES)
     settings: Given = nested(train_settings.setting_options, train_settings.given_settings)
     typed: tuple[str, ...] = ()
@@ -64,9 +72,15 @@ class TrainOptions:
 
 def run(options: TrainOptions) -> int:
     """Run the command; return its exit code."""
+    if options.sweep is not None:
+        return _sweep(options, options.sweep)
+    if (options.jobs, options.engine, options.address) != (1, "local", None):
+        raise ValueError(
+            "--jobs, --engine and --address are of several trainings; add --sweep FILE"
+        )
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
-        asked = _asked_run(options)
+        asked = asked_run(options)
         tell_cores(asked.training.threads, "threads")
         from swarm_mj.learning.loggers import make_logger
         from swarm_mj.learning.train import train  # stable-baselines3 is slow to import
@@ -105,7 +119,28 @@ def run(options: TrainOptions) -> int:
     return DONE
 
 
-def _asked_run(options: TrainOptions) -> TrainingRun:
+def _sweep(options: TrainOptions, path: Path) -> int:
+    """Run several trainings; return the exit code."""
+    from swarm_mj.cli.train_sweep import run_sweep
+
+    alone = TrainOptions(
+        out=options.out,
+        sweep=path,
+        resume=options.resume,
+        jobs=options.jobs,
+        engine=options.engine,
+        address=options.address,
+        settings={},
+        typed=options.typed,
+    )
+    if options != alone:
+        raise ValueError(
+            f"with --sweep, options of trainings stand in {path}; leave out the others"
+        )
+    return run_sweep(path, options.out, options.engine_with([]), is_resumed=options.resume)
+
+
+def asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     device = options.device or run.device

@@ -279,7 +279,11 @@ class EngineOptions:
         return self.jobs if self.engine == "local" else 1
 
     def engine_for(self, study: Study) -> Engine:
-        """Return the engine; raise ValueError for what is not known or does not fit."""
+        """Return the engine of a study; raise ValueError for what is not known or does not fit."""
+        return self.engine_with(stored_policies(study.policies))
+
+    def engine_with(self, policies: Sequence[Path]) -> Engine:
+        """Return the engine of work that names stored policies; raise as `engine_for`."""
         check(self)
         if self.address and self.engine != "ray":
             raise ValueError(f"address {self.address} is of a Ray cluster; add --engine ray")
@@ -287,7 +291,7 @@ class EngineOptions:
             need("ray", "the engine ray")
             from swarm_mj.policies.stored import find_policy  # not in the core
 
-            files = [find_policy(path) for path in stored_policies(study.policies)]
+            files = [find_policy(path) for path in policies]
             return Ray(num_jobs=self.jobs, address=self.address, files=files)
         if self.engine == "local":
             return Local(num_jobs=self.jobs)

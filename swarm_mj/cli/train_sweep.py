@@ -1,0 +1,161 @@
+"""`swarm-mj train --sweep FILE.toml`: a training for each combination of values in a file."""
+
+import io
+import shlex
+import sys
+import tomllib
+from collections.abc import Sequence
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+from rich.console import Console
+
+from swarm_mj.cli import parse
+from swarm_mj.evaluation.engines import Engine
+from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_curve
+from swarm_mj.protocol.mission_costs import AOI
+from swarm_mj.system.arguments import check_kind, check_names
+from swarm_mj.system.exit_codes import DONE, INTERRUPTED
+from swarm_mj.system.fields import as_typed
+from swarm_mj.system.reading import read_file
+from swarm_mj.system.streams import check_printable
+from swarm_mj.system.terminal import WorkBar, plain_console, this_command
+
+MAX_BYTES = 1_000_000
+MAX_TRAININGS = 1000
+NOT_IN_FILES = ("out", "resume", "sweep", "jobs", "engine", "address")  # of the command line alone
+
+
+@dataclass(frozen=True, kw_only=True)
+class Outcome:
+    """What came of a training in another process."""
+
+    code: int  # its exit code
+    said: str  # its last line, which says what went wrong
+
+
+def read_sweep(path: Path) -> dict[str, list[str]]:
+    """Return the options of each training in a file, by its name.
+
+    Args:
+        path: A TOML file. Its table [train] has options of `swarm-mj train`, by their names without
+            dashes, a list for those that take several values. [sweep] has a list of values for
+            each option that is tried; all are combined.
+
+    Raises:
+        ValueError: The file is none, has other tables, or too many combinations.
+        OSError: It cannot be read.
+    """
+    try:
+        tables = tomllib.loads(read_file(path, "sweep", MAX_BYTES).decode())
+        return _trainings(tables)
+    except (ValueError, TypeError, RecursionError) as error:
+        raise ValueError(f"sweep {path}: {error}") from error
+
+
+def _trainings(tables: dict[str, Any]) -> dict[str, list[str]]:
+    check_names("a sweep", tables, ("train", "sweep"))
+    for place in ("train", "sweep"):
+        check_kind(f"[{place}]", tables.setdefault(place, {}), dict, "budget = 40000")
+    swept = tables["sweep"]
+    num_trainings = 1
+    for name, values in swept.items():
+        check_kind(f"[sweep] {name}", values, list, "seed = [1, 2, 3]")
+        num_trainings *= len(values)
+    if not 1 <= num_trainings <= MAX_TRAININGS:
+        raise ValueError(f"it must have 1 to {MAX_TRAININGS} trainings, not {num_trainings}")
+    trainings: dict[str, list[str]] = {}
+    for values in product(*swept.values()):
+        chosen = dict(zip(swept, values, strict=True))
+        options: list[str] = []
+        for name, value in (tables["train"] | chosen).items():
+            options += _typed(name, value)
+        trainings[_name(chosen)] = options
+    return trainings
+
+
+def _typed(name: str, value: object) -> list[str]:
+    """Return an option as it is typed; nothing of a flag that is off."""
+    if name.replace("-", "_") in NOT_IN_FILES:
+        raise ValueError(f"--{name} belongs on the command line, not into the file")
+    if isinstance(value, bool):
+        return [f"--{name}"] if value else []
+    several = value if isinstance(value, list) else [value]
+    words = [as_typed(each) for each in several]
+    for word in words:
+        check_printable(word, "write it without them")
+    return [f"--{name}", *words]
+
+
+def _name(chosen: dict[str, Any]) -> str:
+    """Return the name of a training's folder, by what is its own: such as `seed-1`."""
+    parts: list[str] = []
+    for name, value in chosen.items():
+        several = value if isinstance(value, list) else [value]
+        text = "-".join(as_typed(each) for each in several)
+        parts.append(f"{name}-{text}".replace("/", "-").replace(":", "-"))
+    return "_".join(parts) or "training"
+
+
+def run_sweep(path: Path, out: Path, engine: Engine, *, is_resumed: bool) -> int:
+    """Train what a file asks for, each in a folder of its own; return the exit code.
+
+    Raises:
+        ValueError: An option in the file is unknown, or cannot be trained with.
+        OSError: A file cannot be read or written, or the engine could not do all.
+    """
+    from swarm_mj.cli.train import asked_run
+
+    commands: list[list[str]] = []
+    for name, options in read_sweep(path).items():
+        folder = (out / name).resolve()  # processes elsewhere have other current folders
+        has_begun = is_resumed and (folder / SETTINGS).exists()
+        command = ["train", *options, "--out", str(folder), *(["--resume"] if has_begun else [])]
+        _, asked = parse(command)
+        asked_run(asked)  # whatever is wrong is said before anything is trained
+        commands.append(command)
+    # A training that is done in this process takes the standard streams for itself.
+    console = Console(file=sys.stderr, highlight=False, soft_wrap=True)
+    failed: list[str] = []
+    bar = WorkBar("Training", len(commands), "trainings", console=console)
+    with bar:
+        for number, (index, outcome) in enumerate(engine.run(train_quietly, commands), start=1):
+            folder = Path(commands[index][commands[index].index("--out") + 1])
+            console.print(_line(folder, outcome), markup=False)
+            if outcome.code == INTERRUPTED:
+                return INTERRUPTED
+            if outcome.code != DONE:
+                failed.append(str(folder))
+            bar.move_to(number)
+    if failed:
+        raise OSError(f"{len(failed)} of {len(commands)} trainings failed; --resume tries again")
+    folders = shlex.join(command[command.index("--out") + 1] for command in commands)
+    plain_console().print(f"Compare: {this_command()} curves {folders}")
+    return DONE
+
+
+def train_quietly(command: Sequence[str]) -> Outcome:
+    """Train in this process, without a bar, since several may share a terminal."""
+    heard = io.StringIO()
+    with redirect_stdout(io.StringIO()), redirect_stderr(heard):
+        try:
+            run, options = parse(command)
+            code = run(options)
+        except (ValueError, OSError) as error:
+            return Outcome(code=1, said=str(error))
+    return Outcome(code=code, said=next(reversed(heard.getvalue().strip().splitlines()), ""))
+
+
+def _line(folder: Path, outcome: Outcome) -> str:
+    """Return what came of a training, in a line."""
+    if outcome.code != DONE or not (folder / CURVE).exists():
+        return f"{folder.name}: {outcome.said or 'no evaluation'}"
+    rows = read_curve(folder / CURVE)
+    best = min(row.aoi for row in rows)
+    return (
+        f"{folder.name}: {rows[-1].decisions:,.0f} decisions, age {rows[-1].aoi:.2f}, at best "
+        f"{best:.2f} {AOI.unit}"
+    )

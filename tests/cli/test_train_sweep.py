@@ -1,0 +1,123 @@
+"""`swarm-mj train --sweep`: what a file asks for, what is refused, and that its runs go on."""
+
+import pytest
+
+from swarm_mj.cli import main
+from swarm_mj.cli.train_sweep import read_sweep, train_quietly
+from swarm_mj.learning.run_folder import read_curve, read_run
+
+SWEEP = """
+[train]
+task = "stationary"
+robots = [4, 5]
+windows = 8
+budget = 64
+held-out = 2
+latent = 4
+linear = false
+[sweep]
+seed = [1, 2]
+learning-rate = [0.001, 0.01]
+"""
+
+
+@pytest.fixture
+def sweep(here):
+    (here / "sweep.toml").write_text(SWEEP)
+    return here
+
+
+def train(*arguments):
+    return main(["train", *map(str, arguments)])
+
+
+def test_all_values_are_combined_and_name_their_runs(sweep):
+    trainings = read_sweep(sweep / "sweep.toml")
+    assert list(trainings) == [
+        "seed-1_learning-rate-0.001",
+        "seed-1_learning-rate-0.01",
+        "seed-2_learning-rate-0.001",
+        "seed-2_learning-rate-0.01",
+    ]
+    shared = "--task stationary --robots 4 5 --windows 8 --budget 64 --held-out 2 --latent 4"
+    assert trainings["seed-2_learning-rate-0.01"] == [
+        *shared.split(),
+        *"--seed 2 --learning-rate 0.01".split(),
+    ]
+
+
+def test_flags_and_several_sizes_are_values_too(here):
+    (here / "a.toml").write_text("[sweep]\nlinear = [false, true]\nrobots = [10, [20, 40]]\n")
+    assert read_sweep(here / "a.toml") == {
+        "linear-False_robots-10": ["--robots", "10"],
+        "linear-False_robots-20-40": ["--robots", "20", "40"],
+        "linear-True_robots-10": ["--linear", "--robots", "10"],
+        "linear-True_robots-20-40": ["--linear", "--robots", "20", "40"],
+    }
+    (here / "b.toml").write_text("[train]\nseed = 3\n")
+    assert read_sweep(here / "b.toml") == {"training": ["--seed", "3"]}
+
+
+def test_runs_are_trained_and_go_on(sweep, capsys):
+    (sweep / "sweep.toml").write_text(SWEEP.replace("[0.001, 0.01]", "[0.01]"))
+    asked = ("--sweep", "sweep.toml", "--out", "runs")
+    assert train(*asked) == 0
+    out, err = capsys.readouterr()
+    names = ["seed-1_learning-rate-0.01", "seed-2_learning-rate-0.01"]
+    assert [line.partition(":")[0] for line in err.splitlines() if "at best" in line] == names
+    assert "Compare: " in out
+    for seed, name in enumerate(names, start=1):
+        assert read_run(sweep / "runs" / name).training.seed == seed
+        assert read_curve(sweep / "runs" / name / "curve.csv")[-1].decisions == 64
+    assert train(*asked) == 2
+    assert "go on with a run by --resume" in capsys.readouterr().err
+    (sweep / "sweep.toml").write_text(
+        SWEEP.replace("[0.001, 0.01]", "[0.01]").replace("budget = 64", "budget = 128")
+    )
+    assert train(*asked, "--resume") == 0
+    for name in names:
+        assert read_curve(sweep / "runs" / name / "curve.csv")[-1].decisions == 128
+
+
+@pytest.mark.slow
+def test_processes_train_the_same(sweep):
+    for out, jobs in (("one", 1), ("two", 2)):
+        assert train("--sweep", "sweep.toml", "--out", out, "--jobs", jobs) == 0
+    for name in read_sweep(sweep / "sweep.toml"):
+        one, two = (read_curve(sweep / out / name / "curve.csv") for out in ("one", "two"))
+        assert [row.aoi for row in one] == [row.aoi for row in two]
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("[sweep]\nseed = 1\n", "[sweep] seed must be"),
+        ("[sweeps]\nseed = [1]\n", "sweeps"),
+        ("[sweep]\nseed = []\n", "it must have 1 to 1000 trainings, not 0"),
+        (f"[sweep]\nseed = {list(range(1001))}\n", "it must have 1 to 1000 trainings, not 1001"),
+        ("[train]\nout = 'x'\n", "--out belongs on the command line, not into the file"),
+        ("[train]\nseed = 1979-05-27\nrobots = 5\n", "1979-05-27"),
+        ("[train", "sweep.toml"),
+        ("[train]\nsedd = 1\n", "--sedd"),
+        ("[train]\nrobots = 5\nepochs = 0\n", "epochs"),
+    ],
+)
+def test_a_wrong_file_is_refused_before_anything_is_trained(here, capsys, text, said):
+    (here / "sweep.toml").write_text(text)
+    assert train("--sweep", "sweep.toml", "--out", "runs") == 2
+    assert said in capsys.readouterr().err
+    assert not (here / "runs").exists()
+
+
+def test_options_stand_in_the_file_or_on_the_command_line(sweep, capsys):
+    assert train("--sweep", "sweep.toml", "--out", "runs", "--budget", 5) == 2
+    assert "options of trainings stand in sweep.toml" in capsys.readouterr().err
+    assert train("--out", "runs", "--jobs", 2) == 2
+    assert "add --sweep FILE" in capsys.readouterr().err
+    assert not (sweep / "runs").exists()
+
+
+def test_a_training_that_fails_elsewhere_says_why(here):
+    outcome = train_quietly(["train", "--robots", "5", "--init", "none", "--out", str(here / "x")])
+    assert outcome.code != 0
+    assert "there is no policy none" in outcome.said
