@@ -31,7 +31,7 @@ NOT_IN_FILES = ("out", "resume", "sweep", "jobs", "engine", "address")  # of the
 
 @dataclass(frozen=True, kw_only=True)
 class Outcome:
-    """What came of a training in another process."""
+    """The end of a training in another process."""
 
     code: int  # its exit code
     said: str  # its last line, which says what went wrong

@@ -151,8 +151,8 @@ class Training:
         reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
         ppo: Settings of PPO.
         missions: Missions flown side by side.
-        train_windows: Windows after which missions in training begin anew, at most those of
-            `mission`; None is all of them. Evaluations always fly whole missions.
+        train_windows: Windows after which missions in training begin anew, if they have more;
+            None is when they end. Evaluations always fly whole missions.
         groups: Groups of missions that end at different times.
         seed: The same seed is the same policy.
         evaluate_every: Team decisions between two evaluations.
@@ -218,7 +218,8 @@ class Training:
     # The first windows are the hardest: who begins more often practises them more.
     train_windows: int | None = setting(
         None,
-        "windows after which missions in training begin anew; evaluations fly all of --windows",
+        "windows after which missions in training begin anew, if they have more; evaluations fly "
+        "all of --windows",
         label="train-windows",
         low=1,
         high=MAX_DECISIONS,
@@ -248,18 +249,14 @@ class Training:
         check_fit(self.network, self.features)
         if not self.robots:
             raise ValueError("robots must have at least 1 size")
-        if self.num_windows > self.mission.num_windows:
-            raise ValueError(
-                f"train-windows is {self.num_windows}, but missions have "
-                f"{self.mission.num_windows} windows; choose no more, or raise --windows"
-            )
         if self.credit_assignment == "robot" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
 
     @property
     def num_windows(self) -> int:
         """Windows after which missions in training begin anew."""
-        return self.train_windows or self.mission.num_windows
+        whole = self.mission.num_windows
+        return min(self.train_windows or whole, whole)
 
     @property
     def cost(self) -> MissionCost:

@@ -42,7 +42,7 @@ def test_all_values_are_combined_and_name_their_runs(sweep):
     shared = "--task stationary --robots 4 5 --windows 8 --budget 64 --held-out 2 --latent 4"
     assert trainings["seed-2_learning-rate-0.01"] == [
         *shared.split(),
-        *"--seed 2 --learning-rate 0.01".split(),
+        *["--seed", "2", "--learning-rate", "0.01"],
     ]
 
 
