@@ -35,7 +35,7 @@ from swarm_mj.system.needs import Needs, free_memory, in_gb, memory_errors
 from swarm_mj.system.packages import commit, version
 from swarm_mj.system.terminal import WorkBar
 
-WINDOWS_BETWEEN_LOOKS = 50  # at the free memory
+BETWEEN_LOOKS_BYTES = 4e6  # recorded; a look at the free memory takes half a millisecond
 COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
 SECOND_LOOK_S = 0.5  # memory that others have just freed may still be counted for so long
 
@@ -134,6 +134,9 @@ def _fly_windows(
     # Unless it ends otherwise, below.
     code = FAILED
     ending = "Out of memory"
+    windows_between_looks = 0  # none
+    if recorder and way_on is not None:
+        windows_between_looks = max(1, int(BETWEEN_LOOKS_BYTES / recorder.window_bytes))
     with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
         for window in rollout(swarm):
             if recorder:
@@ -145,8 +148,7 @@ def _fly_windows(
                 code = INTERRUPTED
                 ending = "Interrupted"
                 break
-            is_time = way_on is not None and len(flown) % WINDOWS_BETWEEN_LOOKS == 0
-            if recorder and is_time:
+            if recorder and windows_between_looks and len(flown) % windows_between_looks == 0:
                 short = _shortage(swarm.mission, len(flown), recorder)
                 if short:
                     ending = f"Memory ran short ({short}{way_on})"

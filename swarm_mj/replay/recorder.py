@@ -1,7 +1,7 @@
 """The record of a flight for its replay: one mission's windows as plain arrays."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import replace
 from numbers import Integral
 from typing import Any, NamedTuple
@@ -22,6 +22,9 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
 
 
+FIRST_ROOM = 512  # windows that a recorder begins with room for
+
+
 def check_observer(observer: int, num_robots: int) -> None:
     """Raise ValueError unless there is this robot, whose knowledge a replay shows."""
     is_whole = isinstance(observer, Integral) and not isinstance(observer, bool)
@@ -29,33 +32,52 @@ def check_observer(observer: int, num_robots: int) -> None:
         raise ValueError(f"observer must be from 0 to {num_robots - 1}, not {observer!r}")
 
 
-class _Row(NamedTuple):
-    """A mission's window as it is recorded, or, of all windows, arrays with their axis first.
+class _Rows(NamedTuple):
+    """The windows of a mission, with room for more: the first axis is the windows'.
 
     Each is a field of `Log`, of the same name.
     """
 
-    position_m: Float[np.ndarray, "*T N 2"]
-    velocity_mps: Float[np.ndarray, "*T N 2"]
-    recipient: Int[np.ndarray, "*T 2 N"]
-    heard: Int[np.ndarray, "*T 2 N"]
-    is_on: Bool[np.ndarray, "*T N"]
-    believed_m: Float[np.ndarray, "*T N 2"]
-    ego_age: Float[np.ndarray, "*T N"]
-    known_age: Float[np.ndarray, "*T N"]
-    parent: Int[np.ndarray, "*T N"]
-    age_mean: Float[np.ndarray, "*T"]
-    age_std: Float[np.ndarray, "*T"]
-    age_max: Float[np.ndarray, "*T"]
-    velocity_variance_m2ps2: Float[np.ndarray, "*T"]
+    position_m: Float[np.ndarray, "R N 2"]
+    velocity_mps: Float[np.ndarray, "R N 2"]
+    recipient: Int[np.ndarray, "R 2 N"]
+    heard: Int[np.ndarray, "R 2 N"]
+    is_on: Bool[np.ndarray, "R N"]
+    believed_m: Float[np.ndarray, "R N 2"]
+    ego_age: Float[np.ndarray, "R N"]
+    known_age: Float[np.ndarray, "R N"]
+    parent: Int[np.ndarray, "R N"]
+    age_mean: Float[np.ndarray, "R"]
+    age_std: Float[np.ndarray, "R"]
+    age_max: Float[np.ndarray, "R"]
+    velocity_variance_m2ps2: Float[np.ndarray, "R"]
 
 
-def _stacked(rows: Sequence[_Row]) -> _Row:
-    """Return the rows of all windows as one, of arrays with the windows' axis first."""
-    arrays = {}
-    for name in _Row._fields:
-        arrays[name] = np.stack([getattr(row, name) for row in rows])
-    return _Row(**arrays)
+def _room(num_windows: int, num_robots: int) -> _Rows:
+    """Return room for windows; memory that is not written yet is not taken yet."""
+    robots = (num_windows, num_robots)
+    return _Rows(
+        position_m=np.empty((*robots, 2)),
+        velocity_mps=np.empty((*robots, 2)),
+        recipient=np.empty((num_windows, 2, num_robots), dtype=np.int64),
+        heard=np.empty((num_windows, 2, num_robots), dtype=np.int64),
+        is_on=np.empty(robots, dtype=np.bool_),
+        believed_m=np.empty((*robots, 2)),
+        ego_age=np.empty(robots),
+        known_age=np.empty(robots),
+        parent=np.empty(robots, dtype=np.int32),
+        age_mean=np.empty(num_windows),
+        age_std=np.empty(num_windows),
+        age_max=np.empty(num_windows),
+        velocity_variance_m2ps2=np.empty(num_windows),
+    )
+
+
+def _enlarged(array: np.ndarray, num_rows: int) -> np.ndarray:
+    """Return an array with more rows, the first as they were."""
+    larger = np.empty((num_rows, *array.shape[1:]), dtype=array.dtype)
+    larger[: len(array)] = array
+    return larger
 
 
 class _Compared(NamedTuple):
@@ -70,102 +92,117 @@ class _Compared(NamedTuple):
 class Recorder:
     """Copies what a replay shows from one of a swarm's missions, window by window."""
 
-    def __init__(self, swarm: Swarm, *, ego: int = 0, index: int = 0) -> None:
+    def __init__(
+        self, swarm: Swarm, *, ego: int = 0, index: int = 0, first_room: int = FIRST_ROOM
+    ) -> None:
         """Prepare the record of what the ego robot knows; raise ValueError if there is none."""
         num_robots = swarm.mission.num_robots
         check_observer(ego, num_robots)
-        self._in_matrix = np.array(in_matrix(num_robots))
-        matrices_bytes = AGE_BYTES * len(self._in_matrix) ** 2 * swarm.mission.num_windows
+        self._in_matrix = in_matrix(num_robots)
+        matrix = len(self._in_matrix), len(self._in_matrix)
+        matrices_bytes = AGE_BYTES * math.prod(matrix) * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._radio_stride = links.stride_of(swarm, self._stride)
         self._swarm = swarm
         self._ego = ego
         self._index = index
-        self._rows: list[_Row] = []
-        self._age: list[np.ndarray] = []
+        self._num_rows = 0  # whole ones
+        self._rows = _room(first_room, num_robots)
+        # Half the memory; the picture has 256 shades.
+        self._age = np.empty((-(-first_room // self._stride), *matrix), dtype=np.float32)
         self._task_costs: list[TaskCost] = []
         self._snapshots: list[links.RadioSnapshot] = []  # none in free space
+        self._all_on = np.ones(num_robots, dtype=np.bool_)
 
     def add(self, flown: WindowRecord | None = None) -> None:
         """Record the window that was just flown, if any, with its costs, if they are known."""
-        if len(self._rows) % self._stride == 0:
-            self._add_age_matrix()
-        if len(self._rows) % self._radio_stride == 0:
+        row = self._num_rows
+        if row == len(self._rows.age_mean):
+            self._make_room()
+        if row % self._radio_stride == 0:
             snapshot = links.radio_snapshot(self._swarm, self._index)
             if snapshot is not None:
                 self._snapshots.append(snapshot)
-        age_mean = np.nan
-        velocity_variance = np.nan
+        rows = self._rows
+        rows.age_mean[row] = np.nan
+        rows.velocity_variance_m2ps2[row] = np.nan
         if flown is not None:
-            age_mean = flown.costs.age_windows[self._index]
-            velocity_variance = flown.costs.velocity_variance_m2ps2[self._index]
+            rows.age_mean[row] = flown.costs.age_windows[self._index]
+            rows.velocity_variance_m2ps2[row] = flown.costs.velocity_variance_m2ps2[self._index]
             if flown.costs.task_cost is not None:
                 self._task_costs.append(flown.costs.task_cost)
-        row = self._row(age_mean, velocity_variance)
-        # It comes last: whatever an interrupt leaves unfinished, rows count the whole windows.
-        self._rows.append(row)
+        self._copy_states(row)
+        self._copy_ages(row)
+        # It comes last: whatever an interrupt leaves unfinished, only whole windows count.
+        self._num_rows = row + 1
 
-    def _add_age_matrix(self) -> None:
-        timestamp = self._swarm.buffers.timestamp[self._index]
-        some = timestamp[np.ix_(self._in_matrix, self._in_matrix)]
-        age = self._swarm.now[self._index] - some
-        self._age.append(age.astype(np.float32))  # half the memory; the picture has 256 shades
+    def _make_room(self) -> None:
+        """Make room for twice as many windows."""
+        num_rows = 2 * len(self._rows.age_mean)
+        larger = {}
+        for name, array in self._rows._asdict().items():
+            larger[name] = _enlarged(array, num_rows)
+        self._age = _enlarged(self._age, -(-num_rows // self._stride))
+        self._rows = _Rows(**larger)
 
-    def _row(self, age_mean: float, velocity_variance_m2ps2: float) -> _Row:
-        """Return the window as the swarm has it now, with costs that only its record knows."""
+    def _copy_states(self, row: int) -> None:
+        """Copy where the robots are and what they did, and what the ego robot knows."""
         swarm = self._swarm
         index = self._index
-        own = self._ego
-        buffers = swarm.buffers
+        rows = self._rows
         states = swarm.states
-        timestamp = buffers.timestamp[index]
-        robots = np.arange(len(timestamp))
-        recipient = [robots, robots]  # silence, of a mission that has not begun
-        heard = [robots, robots]
-        if swarm.phases:
-            recipient = [phase.recipient[index] for phase in swarm.phases]
-            heard = [phase.heard[index] for phase in swarm.phases]
-        is_on = np.ones(len(robots), dtype=np.bool_)  # without failures nobody is off
-        if states.is_active is not None:
-            is_on = states.is_active[index]
-        age_std, age_max = _age_spread(timestamp, swarm.now[index], is_on)
-        ego_age = swarm.now[index] - timestamp[own]
-        is_known = (timestamp[own] > NEVER) | buffers.is_granted[index]
-        # Copies: the swarm writes its arrays in place, and a view would keep a whole matrix.
-        return _Row(
-            position_m=np.array(states.position_m[index]),
-            velocity_mps=np.array(states.velocity_mps[index]),
-            recipient=np.array(recipient),
-            heard=np.array(heard),
-            is_on=np.array(is_on),
-            believed_m=np.array(buffers.position_m[index, own]),
-            ego_age=ego_age,
-            known_age=np.where(is_known, ego_age, np.nan),
-            parent=np.array(buffers.parent[index, own]),
-            age_mean=np.array(age_mean),
-            age_std=np.array(age_std),
-            age_max=np.array(age_max),
-            velocity_variance_m2ps2=np.array(velocity_variance_m2ps2),
-        )
+        buffers = swarm.buffers
+        rows.position_m[row] = states.position_m[index]
+        rows.velocity_mps[row] = states.velocity_mps[index]
+        rows.is_on[row] = self._all_on if states.is_active is None else states.is_active[index]
+        rows.believed_m[row] = buffers.position_m[index, self._ego]
+        rows.parent[row] = buffers.parent[index, self._ego]
+        if not swarm.phases:  # silence, of a mission that has not begun
+            rows.recipient[row] = np.arange(len(self._all_on))
+            rows.heard[row] = np.arange(len(self._all_on))
+        for slot, phase in enumerate(swarm.phases):
+            rows.recipient[row, slot] = phase.recipient[index]
+            rows.heard[row, slot] = phase.heard[index]
+
+    def _copy_ages(self, row: int) -> None:
+        """Copy the ages of all pairs, and what they come to."""
+        swarm = self._swarm
+        index = self._index
+        rows = self._rows
+        timestamp = swarm.buffers.timestamp[index]
+        now = swarm.now[index]
+        if row % self._stride == 0:
+            _copy_matrix(timestamp, now, self._in_matrix.step, self._age[row // self._stride])
+        own = timestamp[self._ego]
+        ego_age = now - own
+        rows.ego_age[row] = ego_age
+        is_known = (own > NEVER) | swarm.buffers.is_granted[index]
+        rows.known_age[row] = np.where(is_known, ego_age, np.nan)
+        rows.age_std[row], rows.age_max[row] = _age_spread(timestamp, now, rows.is_on[row])
 
     @property
-    def num_bytes(self) -> int:
-        """The memory taken so far; every window takes the same."""
-        row_bytes = sum(array.nbytes for array in self._rows[0]) if self._rows else 0
-        ages_bytes = sum(age.nbytes for age in self._age)
+    def window_bytes(self) -> float:
+        """The memory that a window takes, but for snapshots of the radio."""
+        row_bytes = sum(array[0].nbytes for array in self._rows)
+        return row_bytes + self._age[0].nbytes / self._stride
+
+    @property
+    def num_bytes(self) -> float:
+        """The memory taken so far."""
         compared_bytes = sum(each.group.nbytes + each.links.nbytes for each in self._snapshots)
-        return len(self._rows) * row_bytes + ages_bytes + compared_bytes
+        return self._num_rows * self.window_bytes + compared_bytes
 
     def log(self, config: Mapping[str, Any] | None = None) -> Log:
         """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
-        if not self._rows:
+        num_windows = self._num_rows
+        if num_windows == 0:
             raise ValueError("a replay needs at least 1 window flown, not 0")
-        flown = _stacked(self._rows)
+        flown = _Rows(*(array[:num_windows] for array in self._rows))
         compared = self._compared(flown.is_on)
-        window = np.arange(1, len(self._rows) + 1)
+        window = np.arange(1, num_windows + 1)
         age_window = window[:: self._stride]
-        # An interrupt within `add` leaves one matrix, snapshot or cost too many.
-        age = np.stack(self._age[: len(age_window)])
+        # An interrupt within `add` leaves one snapshot or cost too many.
+        age = self._age[: len(age_window)]
         costs = self._task_costs[: len(window)]
         value = np.array([cost.value[self._index] for cost in costs])
         facts = self._facts(config or {}, age)
@@ -234,7 +271,7 @@ def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
         IndexError: There is no such mission.
         ValueError: There is no such robot.
     """
-    recorder = Recorder(swarm, ego=observer, index=index)
+    recorder = Recorder(swarm, ego=observer, index=index, first_room=1)
     recorder.add()
     seen = recorder.log()
     # Darkest from a round on, in which everyone has its turn.
@@ -244,6 +281,16 @@ def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
     ground = frame(seen.position_m, half_side_m)
     ground = replace(ground, reach_m=max(half_side_m, ground.reach_m))
     return replace(seen, facts=facts, ground=ground)
+
+
+@compiled(makes_arrays=False)
+def _copy_matrix(
+    timestamp: Float[np.ndarray, "N N"], now: float, step: int, age: Float[np.ndarray, "M M"]
+) -> None:
+    """Fill in the ages of every step-th robot's news of such robots [windows]."""
+    for row in range(len(age)):
+        for column in range(len(age)):
+            age[row, column] = now - timestamp[row * step, column * step]
 
 
 @compiled()

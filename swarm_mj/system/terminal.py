@@ -3,6 +3,7 @@
 import os
 import shutil
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -11,6 +12,7 @@ from rich.progress import BarColumn, Progress, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
 BAR_WIDTH = 20
+BETWEEN_COUNTS_S = 0.1  # as often as the bar is drawn; to count costs as much as a short window
 SPEED_OVER_S = 600.0  # several rollouts of a training, and evaluations between them
 
 
@@ -95,20 +97,32 @@ class WorkBar:
             disable=not console.is_terminal,
         )
         self._id = self._bar.add_task("", total=total, completed=int(completed), bar=self)
+        self._done = 0  # and not counted yet
+        self._next_count_s = 0.0
 
     def __enter__(self) -> "WorkBar":
         self._bar.start()
         return self
 
     def __exit__(self, *error: object) -> None:
+        self._count()
         self._bar.stop()
 
     def advance(self, done: int = 1) -> None:
         """Count more work as done."""
-        self._bar.advance(self._id, done)
+        self._done += done
+        now_s = time.monotonic()
+        if now_s >= self._next_count_s:
+            self._next_count_s = now_s + BETWEEN_COUNTS_S
+            self._count()
+
+    def _count(self) -> None:
+        self._bar.advance(self._id, self._done)
+        self._done = 0
 
     def move_to(self, completed: float | int) -> None:
         """Set how much work is done in all."""
+        self._done = 0
         self._bar.update(self._id, completed=completed)
 
     @property

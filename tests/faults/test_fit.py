@@ -13,6 +13,7 @@ from swarm_mj.api import flight
 from swarm_mj.cli import main
 from swarm_mj.evaluation import flying
 from swarm_mj.evaluation.batch import fly_batch
+from swarm_mj.mission import paper
 from swarm_mj.replay.read import check_replay
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.memory import TORCH
@@ -140,9 +141,16 @@ def flown_short(tmp_path, capsys, ending="Out of memory"):
     return kept
 
 
+def looks_every_50th_window(monkeypatch):
+    """Robots' rows and age matrices of `SMALL` take as much in 50 windows."""
+    window_bytes = Recorder(Swarm(paper(num_robots=4), [1])).window_bytes
+    monkeypatch.setattr(flight, "BETWEEN_LOOKS_BYTES", 50 * window_bytes)
+
+
 @pytest.mark.fault("memory: what was flown is kept")
 def test_a_flight_ends_while_what_was_flown_can_be_written(monkeypatch, tmp_path, capsys):
     """Fault 8: others may take the memory that was free when it began."""
+    looks_every_50th_window(monkeypatch)
     free = chain([1e12], repeat(0))
     monkeypatch.setattr(flight, "free_memory", lambda: next(free))
     needed = "0 GB are free, writing the replay takes 0.162 GB; --yes flies on all the same"
@@ -153,6 +161,7 @@ def test_a_flight_ends_while_what_was_flown_can_be_written(monkeypatch, tmp_path
 @pytest.mark.parametrize(("free", "yes"), [([0.0, 1e12, 1e12], []), ([], ["--yes"])])
 def test_a_flight_goes_on_when_memory_comes_back_or_nobody_minds(monkeypatch, tmp_path, free, yes):
     """It ended at the first look, and despite --yes."""
+    looks_every_50th_window(monkeypatch)
     left = iter(free)
     monkeypatch.setattr(flight, "free_memory", lambda: next(left))
     assert main(["fly", *SMALL, "--record", str(tmp_path / "a.rrd"), *yes]) == 0
@@ -166,7 +175,7 @@ def test_a_memory_error_keeps_what_was_flown(monkeypatch, tmp_path, capsys, erro
     add = Recorder.add
 
     def add_some(self, window):
-        if len(self._rows) == 30:
+        if self._num_rows == 30:
             raise error
         add(self, window)
 

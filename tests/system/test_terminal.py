@@ -8,6 +8,7 @@ import pytest
 from rich.console import Console
 
 from swarm_mj.system import terminal
+from swarm_mj.system import terminal
 from swarm_mj.system.terminal import WorkBar, plain_console, this_command
 
 
@@ -95,3 +96,20 @@ def test_notebooks_which_claim_to_be_terminals_show_none(monkeypatch):
     shell = SimpleNamespace(kernel=None)
     monkeypatch.setitem(sys.modules, "IPython", SimpleNamespace(get_ipython=lambda: shell))
     assert not terminal.quiet_console().is_terminal
+
+
+def test_the_bar_counts_a_burst_of_work_at_its_end_and_a_tenth_of_a_second_later(monkeypatch):
+    """Each count takes as long as a short window does."""
+    clock = iter([0.0, 1.0, 1.05, 1.09, 1.11])
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: next(clock, 2.0))
+    bar, _ = bar_on()
+    bar._next_count_s = 0.5
+    counted = []
+    for _ in range(5):
+        bar.advance()
+        counted.append(bar._bar.tasks[0].completed - 10)
+    assert counted == [0, 2, 2, 2, 5]
+    bar.advance()
+    with bar:
+        bar.advance()
+    assert bar._bar.tasks[0].completed == 17
