@@ -5,10 +5,12 @@ while there is enough to write the windows flown.
 """
 
 import gc
+import math
 import time
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Protocol, TypeAlias
 
 import numpy as np
 from rich.console import Console
@@ -36,6 +38,7 @@ from swarm_mj.system.packages import commit, version
 from swarm_mj.system.terminal import WorkBar
 
 BETWEEN_LOOKS_BYTES = 4e6  # recorded; a look at the free memory takes half a millisecond
+LONGEST_SLEEP_S = 0.05  # after which a flight that waits hears of Ctrl-C
 COMPILING_WINDOWS = 10  # in which three robots use all that a flight does, schedules included
 SECOND_LOOK_S = 0.5  # memory that others have just freed may still be counted for so long
 
@@ -51,6 +54,7 @@ class Flight:
     components: Components = Components()
     seed: int
     observer: int = 0  # the robot whose knowledge the replay shows
+    speed: float = math.inf  # times as fast as the mission's own time, at most
     is_recorded: bool = True
 
     def config(self) -> dict[str, Any]:
@@ -68,6 +72,22 @@ class Flight:
         }
 
 
+class Shown(Protocol):
+    """Shows a flight while it goes on: `swarm_mj.replay.live.LiveReplay`."""
+
+    def show(self) -> None:
+        """Show what was flown, after every window."""
+        ...
+
+    def finish(self) -> None:
+        """Show the rest, after the last one."""
+        ...
+
+
+# Makes it, of a recorder and the flight's configuration.
+Shows: TypeAlias = Callable[[Recorder, Mapping[str, Any]], Shown]
+
+
 class Flown(NamedTuple):
     """A mission flown, its record if there is one, and how the flight ended."""
 
@@ -83,13 +103,16 @@ class Flown(NamedTuple):
         return replace(run, log=self.recorder.log(run.config)) if self.recorder else run
 
 
-def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flown:
+def fly_mission(
+    flight: Flight, *, console: Console, way_on: str | None, shows: Shows | None = None
+) -> Flown:
     """Fly a mission from the first window to the last.
 
     Args:
         flight: What flies.
         console: Where a bar shows how far it is.
         way_on: The end of the message that memory ran short; None flies on regardless.
+        shows: Makes what shows the flight while it goes on; the flight must be recorded.
 
     Raises:
         MemoryError: Memory did not suffice for one window.
@@ -105,10 +128,15 @@ def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flow
         swarm.start(flight.policy)
         recorder = Recorder(swarm, ego=flight.observer) if flight.is_recorded else None
         compile_ahead(mission, flight.policy_name, flight.arguments)
+        shown = shows(recorder, flight.config()) if shows and recorder else None
     bar = WorkBar("Flying", mission.num_windows, "windows", console=console)
+    watch = _watch(flight, bar, recorder, shown, looks=way_on is not None)
     start_s = time.perf_counter()
-    windows, code, ending = _fly_windows(swarm, recorder, bar, way_on)
+    windows, code, ending = _fly_windows(swarm, watch, way_on)
     wall_s = time.perf_counter() - start_s
+    if shown:
+        with console.status("Showing the rest ..."):
+            shown.finish()
 
     numbers = flight_numbers(mission, flight.policy, summarise(windows))
     numbers["wall_seconds"] = wall_s
@@ -126,33 +154,79 @@ def fly_mission(flight: Flight, *, console: Console, way_on: str | None) -> Flow
     return Flown(run=run, recorder=recorder, code=code, ending=ending)
 
 
+class _Watch(NamedTuple):
+    """What goes on after each window of a flight."""
+
+    bar: WorkBar
+    recorder: Recorder | None
+    shown: Shown | None
+    window_s: float  # that each window takes at least: a live flight may be slowed down
+    windows_between_looks: int  # at the free memory; 0 never looks
+
+    def see(self, window: WindowRecord) -> None:
+        """Record and show a window that was flown."""
+        if self.recorder:
+            self.recorder.add(window)
+        self.bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
+        self.bar.advance()
+        if self.shown:
+            self.shown.show()
+
+    def wait(self, start_s: float, num_windows: int, is_interrupted: Callable[[], bool]) -> None:
+        """Wait until it is time for the window after so many; Ctrl-C ends that, too."""
+        if self.window_s == 0.0:
+            return
+        until_s = start_s + num_windows * self.window_s
+        while not is_interrupted() and time.monotonic() < until_s:
+            time.sleep(min(LONGEST_SLEEP_S, max(0.0, until_s - time.monotonic())))
+
+    def shortage(self, mission: Mission, num_windows: int) -> str | None:
+        """Return a message if it is time to look at the memory, and it is short."""
+        every = self.windows_between_looks
+        if self.recorder is None or every == 0 or num_windows % every != 0:
+            return None
+        return _shortage(mission, num_windows, self.recorder)
+
+
+def _watch(
+    flight: Flight, bar: WorkBar, recorder: Recorder | None, shown: Shown | None, *, looks: bool
+) -> _Watch:
+    """Return what goes on after each window; it looks at the memory if it is to."""
+    between = 0
+    if recorder and looks:
+        between = max(1, int(BETWEEN_LOOKS_BYTES / recorder.window_bytes))
+    window_s = flight.mission.window_s / flight.speed
+    return _Watch(
+        bar=bar,
+        recorder=recorder,
+        shown=shown,
+        window_s=window_s,
+        windows_between_looks=between,
+    )
+
+
 def _fly_windows(
-    swarm: Swarm, recorder: Recorder | None, bar: WorkBar, way_on: str | None
+    swarm: Swarm, watch: _Watch, way_on: str | None
 ) -> tuple[list[WindowRecord], int, str]:
     """Return the windows flown, an exit code and why they are not all; MemoryError if none."""
     flown: list[WindowRecord] = []
     # Unless it ends otherwise, below.
     code = FAILED
     ending = "Out of memory"
-    windows_between_looks = 0  # none
-    if recorder and way_on is not None:
-        windows_between_looks = max(1, int(BETWEEN_LOOKS_BYTES / recorder.window_bytes))
-    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, bar:
+    start_s = time.monotonic()
+    with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, watch.bar:
         for window in rollout(swarm):
-            if recorder:
-                recorder.add(window)
+            watch.see(window)
             flown.append(window)
-            bar.text = f"age {float(window.costs.age_windows[0]):.1f}"
-            bar.advance()
+            watch.wait(start_s, len(flown), is_interrupted)
             if is_interrupted():
                 code = INTERRUPTED
                 ending = "Interrupted"
                 break
-            if recorder and windows_between_looks and len(flown) % windows_between_looks == 0:
-                short = _shortage(swarm.mission, len(flown), recorder)
-                if short:
-                    ending = f"Memory ran short ({short}{way_on})"
-                    break
+            short = watch.shortage(swarm.mission, len(flown))
+            if short:
+                ending = f"Memory ran short ({short}{way_on})"
+                break
         else:
             code = DONE
             ending = ""

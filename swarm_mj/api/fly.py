@@ -1,6 +1,7 @@
 """`swarm_mj.fly`: one mission from Python."""
 
 import inspect
+import math
 import warnings
 from collections.abc import Callable, Sequence
 from dataclasses import fields
@@ -8,6 +9,7 @@ from pathlib import Path
 from typing import Unpack
 
 from swarm_mj.api.flight import Flight, flight_needs, fly_mission
+from swarm_mj.api.live import LiveFlight, viewer_to_keep
 from swarm_mj.api.run import Run
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, PresetAndFields, make_mission
@@ -32,6 +34,8 @@ def fly(
     is_deterministic: bool = False,
     record: bool = True,
     observer: int = 0,
+    live: bool | str = False,
+    speed: float | None = None,
     channel: str | Channel | None = None,
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
@@ -55,6 +59,9 @@ def fly(
         is_deterministic: Whether a learned policy takes its most probable recipient, not a draw.
         record: Whether to keep the data of replays and videos, which takes memory.
         observer: The robot whose knowledge the replay shows, from 0.
+        live: True shows the mission in rerun's viewer while it flies, "web" in a browser, at the
+            address that is printed. The viewer stays open until Python ends.
+        speed: Of a live flight, by the mission's own time: 1 is real time, None as fast as it goes.
         channel: Who decodes whom, as an object or `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that adds obstacles to the arena, likewise; none unless given.
@@ -89,6 +96,7 @@ def fly(
         features=named,
         networks=(networks,) if isinstance(networks, str) else tuple(networks),
     )
+    _check_shown(live, speed, record=record)
     made, name = _policy_of(policy, mission, arguments)
     way_out = "choose fewer num_robots or num_windows"
     if record:
@@ -104,11 +112,27 @@ def fly(
         seed=seed,
         observer=observer,
         is_recorded=record,
+        speed=math.inf if speed is None else speed,
     )
-    flown = fly_mission(flight, console=quiet_console(), way_on="")
+    console = quiet_console()
+    shows = None
+    if live:
+        viewer = viewer_to_keep(live, console)
+        shows = LiveFlight(viewer, f"{name}, seed {seed}", speed=speed).begin
+    flown = fly_mission(flight, console=console, way_on="", shows=shows)
     if flown.ending:
         warnings.warn(f"{flown.ending}; these are kept", stacklevel=2)
     return flown.recorded
+
+
+def _check_shown(live: bool | str, speed: float | None, *, record: bool) -> None:
+    """Raise ValueError for arguments of live flights that do not go together."""
+    if live and not record:
+        raise ValueError("live shows what is recorded; leave out record=False")
+    if speed is not None and not live:
+        raise ValueError(f"speed={speed:g} is of live flights; add live=True")
+    if speed is not None and not speed > 0.0:
+        raise ValueError(f"speed must be above 0, not {speed:g}; None is as fast as it goes")
 
 
 def mission_of(

@@ -1,5 +1,6 @@
 """`swarm-mj fly`: flies one mission, records its replay and says what it cost."""
 
+import math
 import os
 import shlex
 from collections.abc import Iterator
@@ -12,6 +13,7 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.flight import Flight, flight_needs, fly_mission
+from swarm_mj.api.live import LiveFlight, check_live, live_option, open_viewer, speed_option
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.mission import Mission
@@ -56,6 +58,10 @@ class FlyOptions(PolicyOptions):
     yes: bool = output_option(False, YES)
     observer: int = output_option(0, "the robot whose knowledge the replay shows")
     view: bool = common_output(False, "open the replay afterwards")
+    live: str | None = live_option(
+        help="show the mission while it flies, in rerun's viewer or, with web, in a browser"
+    )
+    speed: float | None = speed_option()
 
 
 def run(options: FlyOptions) -> int:
@@ -65,21 +71,38 @@ def run(options: FlyOptions) -> int:
     options = replace(options, policy=registry.flown_name(asked, mission))
     if path := _replay_path(options):
         need("rerun", "a replay", "fly without one: --no-record")
+    check_live(options.live, options.speed)
     _check_memory(options, path)
     console = Console(stderr=True, highlight=False)
-    way_on = None if options.yes else "; --yes flies on all the same"
-    flight = _flight(options, is_recorded=path is not None)
-    flown = fly_mission(flight, console=console, way_on=way_on)
     if options.policy != asked:
         console.print(registry.FLOWN_AS)
     for note in notes_on(mission):
         console.print(note)
+    if options.live is None:
+        return _fly(options, path, console)
+    with open_viewer(options.live, console) as viewer:
+        name = path.stem if path else "live"
+        live = LiveFlight(viewer, name, has_file=path is not None, speed=options.speed)
+        code = _fly(options, path, console, live)
+        return viewer.wait() if code == DONE else code
+
+
+def _fly(
+    options: FlyOptions, path: Path | None, console: Console, live: LiveFlight | None = None
+) -> int:
+    """Fly, write and say what was flown; return the exit code."""
+    way_on = None if options.yes else "; --yes flies on all the same"
+    flight = _flight(options, is_recorded=path is not None or live is not None)
+    shows = live.begin if live else None
+    flown = fly_mission(flight, console=console, way_on=way_on, shows=shows)
     with deferred_interrupt(), ExitStack() as stack:
         # The stack unwinds in reverse: the replay is written even if the summary fails, and the
         # table is printed in any case.
         stack.callback(lambda: plain_console().print(flown.run.table()))
         stack.enter_context(console.status("Writing ..."))
-        if path:
+        if path and live:
+            stack.callback(live.save, path)
+        elif path:
             stack.callback(lambda: flown.recorded.save(path))
         if options.json:
             write_json(options.json, flown.run.report(path))
@@ -88,7 +111,8 @@ def run(options: FlyOptions) -> int:
     if flown.ending:
         console.print(f"{flown.ending}.")
         return flown.code
-    return view.run(view.view_command(path)) if options.view and path else DONE
+    is_to_view = options.view and live is None  # which shows it already
+    return view.run(view.view_command(path)) if is_to_view and path else DONE
 
 
 def _check_memory(options: FlyOptions, path: Path | None) -> None:
@@ -111,6 +135,7 @@ def _flight(options: FlyOptions, *, is_recorded: bool) -> Flight:
         seed=options.seed,
         observer=options.observer,
         is_recorded=is_recorded,
+        speed=math.inf if options.speed is None else options.speed,
     )
 
 

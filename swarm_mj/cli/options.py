@@ -264,6 +264,8 @@ def _add(group: argparse._ActionsContainer, option: Option) -> None:
         return
     how["type"] = about.convert or CONVERT.get(about.unit) or CONVERT.get(kind, kind)
     how["metavar"] = _metavar(option)
+    if about.bare is not None:
+        how |= {"nargs": "?", "const": about.bare}
     if option.is_many or get_origin(spec.type) is tuple:
         how |= {"nargs": "+", "action": "extend"}
     if not about.is_positional:

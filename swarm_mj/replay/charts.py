@@ -1,19 +1,18 @@
 """Beside the map: the ego robot's tree, the age matrix, and the radio's state lanes."""
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 from jaxtyping import Bool, Float, Int, Shaped
 
-from swarm_mj.mission.geometry import ROOT, spanning_tree
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.layer_kinds import Entity
 from swarm_mj.replay.log import REQUEST, RESPONSE, Log
-from swarm_mj.replay.palette import RadioState
-from swarm_mj.replay.replay_size import in_matrix
+from swarm_mj.replay.palette import Colour, RadioState
 from swarm_mj.replay.rerun_log import RerunLog
+from swarm_mj.replay.walk import walk
 
 # Width and height of views, in units of their own.
 TREE_SIZE = (600.0, 400.0)  # and of the matrix
@@ -30,16 +29,23 @@ def draw_tree(out: RerunLog) -> None:
     shown = np.ones_like(log.is_on)  # those off, too: what is known of them may be passed on
     colours = palette.robot_colours(log.known_age, log.facts.full_scale, shown, log.ego)
     tree = dendrogram(log.parent, ~np.isnan(log.known_age), log.ego)
-    max_hops = max(4.0, float(np.nanmax(tree.hops)))
-    width, height = TREE_SIZE
-    place = np.stack([tree.hops * (width / max_hops), tree.height * height], axis=-1)
-    across = np.arange(1, int(max_hops) + 1) * (width / int(max_hops))
-    hops = [[(x, -10.0), (x, height + 10.0)] for x in across]
-    out.fixed(layers.TREE_HOPS, layers.TREE_HOPS.look(strips=hops))
+    place = np.stack([tree.hops, tree.height], axis=-1)
+    out.drawn.hops = max(out.drawn.hops, float(np.nanmax(tree.hops)))
     row, child = np.nonzero(log.has_parent)
     out.lines(layers.TREE_EDGES, place[row, log.parent[row, child]], place[row, child], row)
     row, node = np.nonzero(~np.isnan(tree.hops))
     out.points(layers.TREE_NODES, place[row, node], row, colours[row, node])
+
+
+def draw_tree_hops(out: RerunLog) -> None:
+    """Stretch the tree over its view, however deep it has been, and draw a line at each hop."""
+    width, height = TREE_SIZE
+    num_hops = int(out.drawn.hops)
+    stretched = np.diag([width / num_hops, height, 1.0])
+    out.fixed(layers.TREE, rr.Transform3D(mat3x3=stretched))
+    beyond = 10.0 / height
+    hops = [[(hop, -beyond), (hop, 1.0 + beyond)] for hop in range(1, num_hops + 1)]
+    out.fixed(layers.TREE_HOPS, layers.TREE_HOPS.look(strips=hops))
 
 
 class TreePlaces(NamedTuple):
@@ -72,26 +78,11 @@ def dendrogram(
     return places
 
 
-def walk(
-    parent: Sequence[int], robots: Iterable[int], root: int
-) -> tuple[list[int], dict[int, list[int]]]:
-    """Return the root and robots in depth-first order, last children first, and the children."""
-    children: dict[int, list[int]] = {}
-    for k in robots:
-        children.setdefault(parent[k], []).append(k)
-    order: list[int] = []
-    stack = [root]
-    while stack:
-        order.append(stack.pop())
-        stack.extend(children.get(order[-1], []))
-    return order, children
-
-
 def draw_age_matrix(out: RerunLog) -> None:
     """Draw the ages of all pairs; neighbours, along the start's spanning tree, stand together."""
     log = out.log
     full_scale = log.facts.full_scale
-    order = _neighbours_together(log)
+    order = out.drawn.order
     shown = np.ix_(order, order)
     shades = np.empty((len(log.age), len(order), len(order)), dtype=np.uint8)
     for k, age in enumerate(log.age):  # one by one: copies of all would take most of the memory
@@ -99,36 +90,40 @@ def draw_age_matrix(out: RerunLog) -> None:
     ages = np.linspace(0.0, full_scale, OLDEST + 1)
     names = [f"{age:.0f} windows" for age in ages[:-1]] + [f"{full_scale:g} windows or more"]
     colours = palette.age_colours(ages, full_scale).tolist()
-    _draw_classes(out, layers.AGES, shades[0].shape, names, colours, TREE_SIZE)
+    shape = (len(order), len(order))
+    _draw_classes(out, layers.AGES, shape, names, colours, TREE_SIZE)
+    if len(shades) == 0:  # a large team's matrix is kept every few pieces only
+        return
     columns = rr.SegmentationImage.columns(buffer=shades.reshape(len(shades), -1))
     out.timed(layers.AGES, columns, log.age_window)
 
 
-def _neighbours_together(log: Log) -> list[int]:
-    """Return the places of the recorded matrix's rows in the order in which they are drawn."""
-    parent = spanning_tree(log.position_m[:1])[0].tolist()
-    num_robots = len(parent)
-    recorded = {robot: place for place, robot in enumerate(in_matrix(num_robots))}
-    walked, _ = walk(parent, range(num_robots), ROOT)
-    # The tree's root is no robot. Of a large team only every k-th robot was recorded.
-    return [recorded[robot] for robot in walked[1:] if robot in recorded]
-
-
 def draw_states(out: RerunLog) -> None:
-    """Draw a row per robot: what it did with the radio in each window; a line marks this one."""
+    """Mark each window in the picture of the radios' states, and keep these for it."""
     log = out.log
-    colours = palette.BROADCAST_STATES if log.facts.is_broadcast else palette.ADDRESSED_STATES
-    state = radio_states(log).T
+    state = radio_states(log)
+    names = list(_state_colours(log))
+    out.drawn.states.append(np.argmax([state == name for name in names], axis=0).astype(np.uint8))
+    num_windows, num_robots = state.shape
+    amid = log.window - 0.5
+    top = np.stack([amid, np.zeros(num_windows)], axis=1)
+    bottom = np.stack([amid, np.full(num_windows, float(num_robots))], axis=1)
+    out.lines(layers.NOW, top, bottom, np.arange(num_windows))
+
+
+def _state_colours(log: Log) -> dict[RadioState, Colour]:
+    return palette.BROADCAST_STATES if log.facts.is_broadcast else palette.ADDRESSED_STATES
+
+
+def draw_all_states(out: RerunLog) -> None:
+    """Draw a row per robot: what it did with the radio in each window so far."""
+    colours = _state_colours(out.log)
+    shades = np.concatenate(out.drawn.states).T
     names = list(colours)
-    _draw_classes(out, layers.STATES, state.shape, names, list(colours.values()), STATES_SIZE)
-    shades = np.argmax([state == name for name in names], axis=0).astype(np.uint8)
+    _draw_classes(out, layers.STATES, shades.shape, names, list(colours.values()), STATES_SIZE)
     image = rr.SegmentationImage.from_fields(buffer=shades.tobytes())
     out.fixed(layers.STATES, image)
-    num_robots, num_windows = state.shape
-    rows = np.arange(num_windows)
-    top = np.stack([rows + 0.5, np.zeros(num_windows)], axis=1)
-    bottom = np.stack([rows + 0.5, np.full(num_windows, float(num_robots))], axis=1)
-    out.lines(layers.NOW, top, bottom, rows)
+    num_robots, num_windows = shades.shape
     left = -BESIDE * num_windows
     above = -BESIDE * num_robots
     robots = range(0, num_robots, max(1, num_robots // NUM_NAMES))
@@ -136,9 +131,9 @@ def draw_states(out: RerunLog) -> None:
     places = [(left, i + 0.5 + above) for i in robots]
     out.words(layers.STATE_ROBOTS, [f"r{i}" for i in robots], places)
     every = max(1, int(palette.nice_top(num_windows / NUM_TICKS)))
-    ticks = np.flatnonzero(log.window % every == 0).tolist()
-    places = [(k + 0.5, 2.0 * above) for k in ticks]
-    out.words(layers.STATE_WINDOWS, [str(log.window[k]) for k in ticks], places)
+    ticks = range(every, num_windows + 1, every)
+    places = [(window - 0.5, 2.0 * above) for window in ticks]
+    out.words(layers.STATE_WINDOWS, [str(window) for window in ticks], places)
 
 
 def _draw_classes(

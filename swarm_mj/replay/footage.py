@@ -14,6 +14,7 @@ from swarm_mj.replay.links import Lines, LinkMismatch, LinkRows, PacketPaths, Po
 from swarm_mj.replay.palette import Fate
 from swarm_mj.simulation.components import components_in
 
+VIEW = 1.2  # times the area: a team within it lets a replay's map stand still
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
 
 
@@ -28,6 +29,12 @@ class Ground:
     def moves(self) -> bool:
         """True if it follows the team."""
         return bool(np.any(self.centre_m))
+
+    def is_like(self, other: "Ground | None") -> bool:
+        """Tell whether another one is as large, and lies as far."""
+        if other is None or self.reach_m != other.reach_m:
+            return False
+        return np.array_equal(self.centre_m, other.centre_m)
 
 
 def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) -> Ground:
@@ -50,6 +57,26 @@ def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) 
     least_m = 0.0 if moves else 1.0
     reach_m = max(least_m, float(np.max(high_m - low_m)) / 2.0)
     return Ground(centre_m=(low_m + high_m) / 2.0, reach_m=reach_m)
+
+
+def followed(position_m: Positions, mission: Mission) -> Ground:
+    """Return the square of the ground that a replay's map shows, for some windows of a flight.
+
+    Each window's centre depends on that window alone: a live replay does not know where the team
+    will fly. It stays at the origin until the team would leave `VIEW` times the area.
+    """
+    half_m = mission.half_side_m
+    low_m = np.min(position_m, axis=1)
+    high_m = np.max(position_m, axis=1)
+    centre_m = np.zeros_like(low_m)
+    if not mission.has_walls:
+        least_m = high_m - VIEW * half_m
+        most_m = low_m + VIEW * half_m
+        # A team that is wider than the view has its middle at the centre.
+        middle_m = (low_m + high_m) / 2.0
+        centre_m = np.where(least_m > most_m, middle_m, np.clip(0.0, least_m, most_m))
+    farthest_m = float(np.max(np.abs(position_m - centre_m[:, None])))
+    return Ground(centre_m=centre_m, reach_m=max(half_m, farthest_m))
 
 
 def shown_ground(position_m: Positions, mission: Mission) -> Ground:
@@ -101,8 +128,8 @@ class Footage:
 
     @property
     def has_motion(self) -> bool:
-        """True if any robot moves."""
-        return bool(np.any(self.velocity_mps))
+        """True if robots may move."""
+        return self.facts.mission.moves or self.facts.controller is not None
 
     @property
     def is_compared(self) -> bool:

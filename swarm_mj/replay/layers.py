@@ -4,6 +4,7 @@ A layer is one entry here. `write`, `stage` and `charts` draw it by its name in 
 finds it by the same name, and a view of the layout shows whatever is below the view's path.
 """
 
+from collections.abc import Container
 from typing import NamedTuple
 
 import numpy as np
@@ -11,7 +12,7 @@ from jaxtyping import Float
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.layer_kinds import Arrows, Entity, Flat, Lines, Lines3D, Points, Rings, View
-from swarm_mj.replay.links import DASHES, WHOLE, by_kind
+from swarm_mj.replay.links import DASHES, WHOLE
 from swarm_mj.replay.log import Log
 from swarm_mj.replay.palette import Colour, Fate, LinkKind
 
@@ -83,6 +84,7 @@ AGE_PLOT = View(path="plots/age")
 PACKET_PLOT = View(path="plots/radio")
 LINK_PLOT = View(path="plots/world")
 COST_PLOT = View(path="plots/task")
+AGREED = COST_PLOT.below("agreed")
 MEAN_AGE = AGE_PLOT.below("mean")
 WORST_AGE = AGE_PLOT.below("worst")
 LEGEND = View(path="legend")
@@ -121,8 +123,13 @@ class LegendSample(NamedTuple):
     pieces: Float[np.ndarray, "P 2"] = WHOLE  # that a line is drawn in
 
 
-def legend(log: Log) -> list[list[LegendSample]]:
-    """Return the legend's rows: the radio, what else is shown, mismatched links."""
+def legend(
+    log: Log, link_kinds: Container[LinkKind], *, is_any_cut_off: bool
+) -> list[list[LegendSample]]:
+    """Return the legend's rows: the radio, what else is shown, mismatched links.
+
+    Of these it names the kinds that occur, and robots that are cut off if any ever are.
+    """
     packets = _packet_samples(log)
     others = []
     if log.has_motion:
@@ -137,7 +144,16 @@ def legend(log: Log) -> list[list[LegendSample]]:
     else:  # the four fates of addressed packets fill their row
         others.append(reach)
     rows = [packets, others]
-    if links := _link_samples(log):
+    links: list[LegendSample] = []
+    if "too_weak" in link_kinds:
+        colour = palette.MISMATCH["too_weak"]
+        links.append(LegendSample("believed,\ntoo weak", TOO_WEAK, colour=colour, pieces=DASHES))
+    if "unbelieved" in link_kinds:
+        colour = palette.MISMATCH["unbelieved"]
+        links.append(LegendSample("works,\nunbelieved", UNBELIEVED, colour=colour))
+    if is_any_cut_off:
+        links.append(LegendSample(f"cut off\nfrom r{log.ego}", CUT_OFF))
+    if links:
         rows.append(links)
     return rows
 
@@ -151,19 +167,3 @@ def _packet_samples(log: Log) -> list[LegendSample]:
         LegendSample("answered", ANSWERED),
         LegendSample("overheard", OVERHEARD),
     ]
-
-
-def _link_samples(log: Log) -> list[LegendSample]:
-    if not log.is_compared:
-        return []
-    samples = []
-    links = by_kind(log.mismatch.links)
-    if len(links["too_weak"]) > 0:
-        colour = palette.MISMATCH["too_weak"]
-        samples.append(LegendSample("believed,\ntoo weak", TOO_WEAK, colour=colour, pieces=DASHES))
-    if len(links["unbelieved"]) > 0:
-        colour = palette.MISMATCH["unbelieved"]
-        samples.append(LegendSample("works,\nunbelieved", UNBELIEVED, colour=colour))
-    if np.any(log.is_cut_off):
-        samples.append(LegendSample(f"cut off\nfrom r{log.ego}", CUT_OFF))
-    return samples

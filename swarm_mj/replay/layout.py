@@ -13,7 +13,6 @@ from rerun.encodings import EntityPathLike
 
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.charts import STATES_SIZE, TREE_SIZE
-from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.layer_kinds import Arrows, Lines, Lines3D, Points, Rings, of_others
 from swarm_mj.replay.layers import LegendSample, legend
 from swarm_mj.replay.log import Log
@@ -31,6 +30,7 @@ RAMP = 31.0  # how long it is
 COLUMN = 14.2  # from one sample to the next, to the right of the ramp
 ROW = 8.4  # from one row of samples to the next
 SAMPLE = 5.0  # the length of a sample
+MOST_ROWS = 3  # of samples, which a flight that goes on may come to need
 LAST = 5.1  # the height of the last row, with its texts
 LINE = 1.9  # of a text's second line, which they have beyond free space only
 BELOW = 2.6  # from a sample to its text
@@ -53,23 +53,37 @@ class Layout(rrb.Blueprint):
         del self._stream
 
 
-def layout(log: Log, ground: Ground) -> Layout:
-    """Return the blueprint: tabs of the mission, its scene, and the radio of every robot."""
+def layout(out: RerunLog, *, is_live: bool = False, live_fps: float | None = None) -> Layout:
+    """Return the blueprint: tabs of the mission, its scene, and the radio of every robot.
+
+    A live one is for a flight that goes on: the plots' axes grow with it, and the viewer shows what
+    came last, or plays so many windows a second.
+    """
     mission = rrb.Horizontal(
-        _left(log, ground),
-        _right(log),
+        _left(out, is_live=is_live),
+        _right(out, is_live=is_live),
         column_shares=[11, 10],
         name="Mission",
     )
-    tabs = rrb.Tabs(mission, _scene(ground.reach_m), _radio(log), active_tab=0)
+    scene = _scene(out.drawn.ground.reach_m)
+    tabs = rrb.Tabs(mission, scene, _radio(out.log), active_tab=0)
     panel = rrb.TimePanel(
         state="collapsed", timeline=TIMELINE, fps=WINDOWS_PER_SECOND, loop_mode="all"
     )
+    if is_live:
+        panel = rrb.TimePanel(
+            state="collapsed",
+            timeline=TIMELINE,
+            fps=live_fps or WINDOWS_PER_SECOND,
+            play_state="playing" if live_fps else "following",
+            loop_mode="off",
+        )
     return Layout(tabs, panel, collapse_panels=True, auto_views=False)
 
 
-def _left(log: Log, ground: Ground) -> rrb.Vertical:
+def _left(out: RerunLog, *, is_live: bool) -> rrb.Vertical:
     """Return the map above its legend."""
+    ground = out.drawn.ground
     across = (-MARGIN * ground.reach_m, MARGIN * ground.reach_m)
     name = f"Map, squares of {square_m(ground):g} m"
     if ground.moves:
@@ -77,25 +91,29 @@ def _left(log: Log, ground: Ground) -> rrb.Vertical:
     map_view = _drawing(
         "/", name, across, across, contents=layers.ARENA.contents, hidden=layers.LINKS.values()
     )
-    height = legend_height(log)
+    num_rows = MOST_ROWS if is_live and out.log.is_compared else len(legend_rows(out))
+    height = legend_height(out.log, num_rows)
     samples = _drawing(
         f"/{layers.LEGEND.path}", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False
     )
     return rrb.Vertical(map_view, samples, row_shares=[4, height / (ROW + LAST)])
 
 
-def _right(log: Log) -> rrb.Vertical:
+def _right(out: RerunLog, *, is_live: bool) -> rrb.Vertical:
     """Return the tree and the age matrix above the charts."""
+    log = out.log
     width, height = TREE_SIZE
     across = (-0.05 * width, 1.05 * width)
     up = (-0.05 * height, 1.05 * height)
-    tree = _drawing(f"/{layers.TREE.path}", f"Tree of r{log.ego}, in hops", across, up)
+    name = f"Tree of r{log.ego}, in hops"
+    tree = _drawing("/", name, across, up, contents=layers.TREE.contents)
     name = "Ages: rows about columns"
     every = in_matrix(log.facts.mission.num_robots).step
     if every > 1:
         name += f", every {every}th robot"
     matrix = _drawing("/", name, (0.0, width), (0.0, height), contents=f"/{layers.AGES.path}")
-    charts = [_plot(plot) for plot in plots(log)]
+    tops = {} if is_live else out.drawn.tops
+    charts = [_plot(plot, tops.get(plot.view.path)) for plot in plots(log)]
     shares = [4] + [3] * len(charts)
     return rrb.Vertical(rrb.Horizontal(tree, matrix), *charts, row_shares=shares)
 
@@ -164,18 +182,18 @@ def _drawing(
     )
 
 
-def _plot(plot: Plot) -> rrb.TimeSeriesView:
+def _plot(plot: Plot, highest: float | None) -> rrb.TimeSeriesView:
+    """Return a plot's view, up to the highest value of its curves; None is not known yet."""
     hidden: Overrides = {}
-    highest = 0.0
     for curve in plot.curves:
         if curve.is_hidden:
             hidden[f"/{curve.entity.path}"] = rrb.EntityBehavior(visible=False)
-        else:
-            highest = max(highest, float(np.max(curve.values + curve.std)))
-    top = palette.nice_top(highest)
+    axis = None
+    if highest is not None:  # so that both ends have numbers
+        axis = rrb.ScalarAxis(range=(0.0, 1.06 * palette.nice_top(highest)))
     return rrb.TimeSeriesView(
         overrides=hidden,
-        axis_y=rrb.ScalarAxis(range=(0.0, 1.06 * top)),  # so that both ends have numbers
+        axis_y=axis,
         origin=f"/{plot.view.path}",
         name=plot.title,
         plot_legend=rrb.PlotLegend(visible=False),  # it would cover curves; the name says the same
@@ -186,7 +204,7 @@ def _plot(plot: Plot) -> rrb.TimeSeriesView:
 def draw_legend(out: RerunLog) -> None:
     """Draw the ramp of ages, and samples of what the map shows."""
     _draw_ramp(out)
-    for row, samples in enumerate(legend(out.log)):
+    for row, samples in enumerate(legend_rows(out)):
         y = row * _row_height(out.log)
         for column, sample in enumerate(samples):
             x = LEFT + RAMP + (column + 0.9) * COLUMN
@@ -209,9 +227,15 @@ def _draw_ramp(out: RerunLog) -> None:
     out.words(layers.LEGEND.below("about_ages"), [about], [(LEFT + RAMP / 2, ROW)])
 
 
-def legend_height(log: Log) -> float:
+def legend_rows(out: RerunLog) -> list[list[LegendSample]]:
+    """Return the legend of what was drawn so far."""
+    drawn = out.drawn
+    return legend(out.log, drawn.link_kinds, is_any_cut_off=drawn.is_any_cut_off)
+
+
+def legend_height(log: Log, num_rows: int) -> float:
     """Return the height of the legend's view."""
-    return len(legend(log)) * _row_height(log) - ROW + LAST
+    return num_rows * _row_height(log) - ROW + LAST
 
 
 def _row_height(log: Log) -> float:

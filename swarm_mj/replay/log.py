@@ -1,6 +1,7 @@
-"""The log of a flight: all that its replay shows, as plain arrays."""
+"""The log of a flight, or of a piece of it: all that its replay shows, as plain arrays."""
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -10,15 +11,25 @@ from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
 from swarm_mj.replay.footage import Footage
 
+LEAD_WINDOWS = 150  # that a piece of a flight knows of what was before it
 # The slots of a window of Alg. 1, in arrays of both.
 REQUEST = 0
 RESPONSE = 1
 
 
+class Lead(NamedTuple):
+    """The last windows before a piece of a flight: what trails and counts reach back to."""
+
+    position_m: Float[np.ndarray, "P N 2"]
+    recipient: Int[np.ndarray, "P 2 N"]
+    heard: Int[np.ndarray, "P 2 N"]
+
+
 @dataclass(frozen=True, kw_only=True)
 class Log(Footage):
-    """Footage and all else that a replay shows of a flight, as it was recorded."""
+    """Footage and all else that a replay shows of a flight, or of a piece, as it was recorded."""
 
+    lead: Lead  # of at most `LEAD_WINDOWS`; none before a whole flight
     recipient: Int[np.ndarray, "T 2 N"]  # S^i in both phases; itself: silent
     heard: Int[np.ndarray, "T 2 N"]  # the sender that robot j decoded in both phases; itself: none
     believed_m: Float[np.ndarray, "T N 2"]  # M: where j was, as the ego robot knows it [m]

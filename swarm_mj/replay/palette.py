@@ -67,6 +67,7 @@ HALO = 1.7  # the radius around a robot that is cut off, by the robot's
 MEAN_AGE: Colour = (53, 183, 121)
 WORST_AGE: Colour = (150, 158, 172)
 VARIANCE: Colour = (240, 200, 80)
+AGREED: Colour = (255, 255, 255)
 # The mean age in videos, of one flight and of a second: no colours of the ramp, which mean ages.
 FILM_CURVES: tuple[Colour, Colour] = ((255, 255, 255), (255, 120, 190))
 
@@ -136,12 +137,6 @@ def robot_colours(
     colours = age_colours(age_windows, full_scale)
     colours[..., ego, :] = EGO
     return np.where(is_on[..., None], colours, np.array(SWITCHED_OFF, np.uint8))
-
-
-def nice_scale(age_windows: Ages) -> float:
-    """Return a round number of windows that 19 ages in 20 lie below."""
-    # Without the oldest: robots that are hardly ever reached would make all others look alike.
-    return nice_top(max(1.0, float(np.percentile(age_windows, 95))))
 
 
 def nice_top(value: float) -> float:

@@ -1,18 +1,20 @@
 """The plots of a replay: curves of ages, packets, links and the task's cost over the windows."""
 
+from collections.abc import Mapping
 from typing import NamedTuple
 
 import numpy as np
 import rerun as rr
 from jaxtyping import Int
 
+from swarm_mj.protocol.agreement import agreed_window
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.layer_kinds import Entity, View
-from swarm_mj.replay.links import by_kind, is_other
+from swarm_mj.replay.links import PacketPaths, Phases, by_kind, fates, is_other
 from swarm_mj.replay.log import Log
-from swarm_mj.replay.palette import Colour
+from swarm_mj.replay.palette import Colour, Fate
 from swarm_mj.replay.rerun_log import RerunLog
 
 RATE_WINDOWS = 10  # that packets are counted over
@@ -48,7 +50,10 @@ def plots(log: Log) -> list[Plot]:
         variance = log.velocity_variance_m2ps2
         cost = TaskCost(name=VELOCITY_VARIANCE.title, unit=VELOCITY_VARIANCE.unit, value=variance)
     if cost is not None:
-        found.append(_cost_plot(cost))
+        plot = _cost_plot(cost)
+        if shows_agreement(log):
+            plot = plot._replace(title=f"{plot.title}; a line: the flock has agreed")
+        found.append(plot)
     return found
 
 
@@ -68,17 +73,22 @@ def _age_plot(log: Log) -> Plot:
 
 
 def _packet_plot(log: Log) -> Plot:
+    before = [each[-RATE_WINDOWS + 1 :] for each in log.lead]
+    now = [log.position_m, log.recipient, log.heard]
+    position_m, recipient, heard = (np.concatenate(pair) for pair in zip(before, now, strict=True))
     if log.facts.is_broadcast:
         sent = "sent (grey), heard by anyone (blue)"
-        counts = _broadcast_counts(log)
+        counts = _broadcast_counts(recipient, heard)
     else:
         sent = "delivered (green), lost (orange), answered (blue)"
-        counts = _addressed_counts(log)
+        packets = fates(recipient, heard, position_m, is_broadcast=False)
+        counts = _addressed_counts(packets, len(recipient))
     view = layers.PACKET_PLOT
     curves = []
     for name, (colour, count) in counts.items():
         # Over several windows, for the counts of single ones would hide the trend.
-        recent = np.convolve(count, np.ones(RATE_WINDOWS))[: len(log.window)]
+        recent = np.convolve(count, np.ones(RATE_WINDOWS))[: len(count)]
+        recent = recent[-len(log.window) :]  # not those before this piece
         is_hidden = name == "overheard"
         curves.append(PlotCurve(view.below(name), name, colour, recent, is_hidden=is_hidden))
     return Plot(title=f"Packets in {RATE_WINDOWS} windows: {sent}", view=view, curves=curves)
@@ -87,19 +97,19 @@ def _packet_plot(log: Log) -> Plot:
 Counts = dict[str, tuple[Colour, Int[np.ndarray, "T"]]]  # of packets in each window, by their names
 
 
-def _broadcast_counts(log: Log) -> Counts:
-    sent = np.sum(is_other(log.recipient), axis=(1, 2))
-    row, phase, hearer = np.nonzero(is_other(log.heard))
+def _broadcast_counts(recipient: Phases, heard: Phases) -> Counts:
+    sent = np.sum(is_other(recipient), axis=(1, 2))
+    row, phase, hearer = np.nonzero(is_other(heard))
     # A packet that several robots heard counts once.
-    heard_row, _, _ = np.unique([row, phase, log.heard[row, phase, hearer]], axis=1)
-    num_heard = np.bincount(heard_row, minlength=len(log.window))
+    heard_row, _, _ = np.unique([row, phase, heard[row, phase, hearer]], axis=1)
+    num_heard = np.bincount(heard_row, minlength=len(heard))
     return {"sent": (palette.SENT, sent), "heard": (palette.BROADCAST, num_heard)}
 
 
-def _addressed_counts(log: Log) -> Counts:
+def _addressed_counts(packets: Mapping[Fate, PacketPaths], num_windows: int) -> Counts:
     counts: Counts = {}
     for fate, colour in palette.COUNTED.items():
-        counts[fate] = (colour, np.bincount(log.packets[fate].row, minlength=len(log.window)))
+        counts[fate] = (colour, np.bincount(packets[fate].row, minlength=num_windows))
     return counts
 
 
@@ -144,9 +154,45 @@ def _cost_plot(cost: TaskCost) -> Plot:
 
 def draw_plots(out: RerunLog) -> None:
     """Draw the curves of all plots."""
+    tops = out.drawn.tops
     for plot in plots(out.log):
         for curve in plot.curves:
             _draw_curve(out, curve)
+            if not curve.is_hidden:
+                highest = float(np.max(curve.values + curve.std))
+                tops[plot.view.path] = max(tops.get(plot.view.path, 0.0), highest)
+    if shows_agreement(out.log):
+        out.drawn.variance_m2ps2.append(out.log.velocity_variance_m2ps2)
+
+
+def shows_agreement(log: Log) -> bool:
+    """Tell whether a plot has the velocity variance, by which flocks agree."""
+    is_plotted = log.task_cost is None or log.task_cost.name == VELOCITY_VARIANCE.title
+    return is_plotted and log.facts.mission.flocks
+
+
+def agreed(out: RerunLog) -> int | None:
+    """Return the window from which on the flock has agreed, to the last one drawn, if it has."""
+    if not shows_agreement(out.log):
+        return None
+    variance = np.concatenate(out.drawn.variance_m2ps2)
+    (since,) = agreed_window(list(variance[:, None]))
+    return None if np.isnan(since) else int(since)
+
+
+def draw_agreement(out: RerunLog) -> None:
+    """Draw a line up the plot of the velocity variance where the flock has agreed for good.
+
+    That is known in the end only: as long as more windows follow, it may agree later.
+    """
+    since = agreed(out)
+    if since is None:
+        return
+    look = rr.SeriesLines(widths=[1.6], colors=[palette.AGREED], names=["the flock has agreed"])
+    out.fixed(layers.AGREED, look)
+    top = palette.nice_top(out.drawn.tops[layers.COST_PLOT.path])
+    both_ends = rr.Scalars.columns(scalars=[0.0, top])
+    out.timed(layers.AGREED, both_ends, np.array([since, since]))
 
 
 def _draw_curve(out: RerunLog, curve: PlotCurve) -> None:

@@ -13,15 +13,15 @@ from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
 from swarm_mj.replay.footage import Facts, Footage, frame, shown_ground
-from swarm_mj.replay.log import Log
-from swarm_mj.replay.palette import nice_scale
+from swarm_mj.replay.log import LEAD_WINDOWS, Lead, Log
+from swarm_mj.replay.palette import nice_top
 from swarm_mj.replay.replay_size import AGE_BYTES, MAX_AGE_MATRIX_BYTES, in_matrix
 from swarm_mj.simulation.components import components_in
 from swarm_mj.simulation.rollout import WindowRecord
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.compiled import compiled
 
-
+PIECE_WINDOWS = 25  # at least
 FIRST_ROOM = 512  # windows that a recorder begins with room for
 
 
@@ -192,20 +192,43 @@ class Recorder:
         compared_bytes = sum(each.group.nbytes + each.links.nbytes for each in self._snapshots)
         return self._num_rows * self.window_bytes + compared_bytes
 
+    @property
+    def piece_windows(self) -> int:
+        """The number of windows in a piece of the log, which begins with a snapshot if any do."""
+        return self._radio_stride * -(-PIECE_WINDOWS // self._radio_stride)
+
+    @property
+    def num_windows(self) -> int:
+        """The number of whole windows recorded."""
+        return self._num_rows
+
+    def piece(self, config: Mapping[str, Any], before: int, until: int) -> Log:
+        """Return some of the windows; the pieces of a flight show what its whole log does.
+
+        Args:
+            config: For titles.
+            before: The windows before them, a multiple of `piece_windows`.
+            until: The last of them, counted from 1.
+        """
+        return self._log(config, before, until)
+
     def log(self, config: Mapping[str, Any] | None = None) -> Log:
         """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
-        num_windows = self._num_rows
-        if num_windows == 0:
+        if self._num_rows == 0:
             raise ValueError("a replay needs at least 1 window flown, not 0")
-        flown = _Rows(*(array[:num_windows] for array in self._rows))
-        compared = self._compared(flown.is_on)
-        window = np.arange(1, num_windows + 1)
-        age_window = window[:: self._stride]
+        return self._log(config or {}, 0, self._num_rows)
+
+    def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
+        """Return the windows from a row on, up to another."""
+        flown = _Rows(*(array[first:after] for array in self._rows))
+        lead = slice(max(0, first - LEAD_WINDOWS), first)
+        compared = self._compared(flown.is_on, first)
+        window = np.arange(first + 1, after + 1)
+        matrices = slice(-(-first // self._stride), -(-after // self._stride))
         # An interrupt within `add` leaves one snapshot or cost too many.
-        age = self._age[: len(age_window)]
-        costs = self._task_costs[: len(window)]
+        costs = self._task_costs[first:after]
         value = np.array([cost.value[self._index] for cost in costs])
-        facts = self._facts(config or {}, age)
+        facts = self._facts(config)
         packets = links.fates(
             flown.recipient, flown.heard, flown.position_m, is_broadcast=facts.is_broadcast
         )
@@ -215,27 +238,36 @@ class Recorder:
             packets=packets,
             ground=shown_ground(flown.position_m, facts.mission),
             scene=self._swarm.scene,
-            age_window=age_window,
-            age=age,
+            lead=Lead(
+                position_m=self._rows.position_m[lead],
+                recipient=self._rows.recipient[lead],
+                heard=self._rows.heard[lead],
+            ),
+            age_window=np.arange(matrices.start, matrices.stop) * self._stride + 1,
+            age=self._age[matrices],
             task_cost=replace(costs[0], value=value) if costs else None,
             **flown._asdict(),
             **compared._asdict(),
         )
 
-    def _facts(self, config: Mapping[str, Any], age: Float[np.ndarray, "K M M"]) -> Facts:
+    def _facts(self, config: Mapping[str, Any]) -> Facts:
+        mission = self._swarm.mission
         return Facts(
-            mission=self._swarm.mission,
+            mission=mission,
             policy=config.get("policy", ""),  # nothing names that of a picture, or of a training
             seed=config.get("seed", 0),
             observer=self._ego,
             is_broadcast=self._swarm.is_broadcast,
-            full_scale=nice_scale(age),
+            # Darkest from about a round on, in which everyone has its turn. It is not of the ages
+            # flown: all replays of a mission have one scale, also those that are not over yet.
+            full_scale=nice_top(min(mission.num_robots, mission.num_windows)),
             **components_in(config).names,
         )
 
-    def _compared(self, is_on: Bool[np.ndarray, "T N"]) -> _Compared:
-        window = np.arange(1, len(is_on) + 1)[:: self._radio_stride]
-        snapshots = self._snapshots[: len(window)]
+    def _compared(self, is_on: Bool[np.ndarray, "T N"], first: int) -> _Compared:
+        window = np.arange(first + 1, first + len(is_on) + 1, self._radio_stride)
+        before = first // self._radio_stride
+        snapshots = self._snapshots[before : before + len(window)]
         is_cut_off = np.zeros_like(is_on)
         mismatch = links.NO_MISMATCH
         if snapshots:
@@ -274,13 +306,11 @@ def moment(swarm: Swarm, index: int = 0, *, observer: int = 0) -> Footage:
     recorder = Recorder(swarm, ego=observer, index=index, first_room=1)
     recorder.add()
     seen = recorder.log()
-    # Darkest from a round on, in which everyone has its turn.
-    facts = replace(seen.facts, full_scale=float(swarm.mission.num_robots))
     # As wide wherever the team is: a live picture does not know where it will fly.
     half_side_m = swarm.mission.half_side_m
     ground = frame(seen.position_m, half_side_m)
     ground = replace(ground, reach_m=max(half_side_m, ground.reach_m))
-    return replace(seen, facts=facts, ground=ground)
+    return replace(seen, ground=ground)
 
 
 @compiled(makes_arrays=False)

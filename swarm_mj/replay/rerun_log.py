@@ -1,14 +1,16 @@
 """A replay as rerun's recording: each entity's rows on the mission's timelines."""
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, field
 
 import numpy as np
 import rerun as rr
-from jaxtyping import Float, Int
+from jaxtyping import Float, Int, UInt8
 
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.footage import Ground, followed
 from swarm_mj.replay.layer_kinds import (
     Arrows,
     Colours,
@@ -24,27 +26,73 @@ from swarm_mj.replay.links import LinkRows, shades
 from swarm_mj.replay.links import Points as Places
 from swarm_mj.replay.log import Log
 from swarm_mj.replay.palette import LinkKind
+from swarm_mj.replay.walk import neighbours_together
 
 TIMELINE = "window"
 CROWD = 400  # robots from which on they are drawn smaller, so that they do not cover each other
 
 
-class RerunLog:
-    """Writes a log's entities; one that changes shows the row of the last window.
+@dataclass(kw_only=True)
+class Drawn:
+    """What is known of all pieces of a flight that were drawn: what stands still shows it."""
 
-    Things that change come with their windows, `row`, ascending from 0; without, they are all
-    robots in each window.
+    ground: Ground  # with the lowest and the highest centre
+    order: list[int]  # of robots in the age matrix, as they are drawn
+    num_windows: int = 0
+    num_sent: int = 0  # packets
+    hops: float = 4.0  # of the deepest tree, or more
+    states: list[UInt8[np.ndarray, "_ N"]] = field(default_factory=list)  # of radios, by number
+    variance_m2ps2: list[Float[np.ndarray, "_"]] = field(default_factory=list)
+    tops: dict[str, float] = field(default_factory=dict)  # the highest values, by the plot's path
+    link_kinds: set[LinkKind] = field(default_factory=set)  # that occurred
+    is_any_cut_off: bool = False
+
+    def add_ground(self, ground: Ground) -> None:
+        """Make the ground as large as this piece's and those before need it."""
+        centres_m = np.concatenate([self.ground.centre_m, ground.centre_m])
+        ends_m = np.stack([np.min(centres_m, axis=0), np.max(centres_m, axis=0)])
+        reach_m = max(self.ground.reach_m, ground.reach_m)
+        self.ground = Ground(centre_m=ends_m, reach_m=reach_m)
+
+
+class RerunLog:
+    """Writes the entities of a flight's log, or of one piece after the other.
+
+    An entity that changes shows the row of the last window. Things that change come with their
+    windows, `row`, ascending from 0, the first of the piece; without, they are all robots in each
+    window.
     """
 
-    def __init__(self, recording: rr.RecordingStream, log: Log, ground: Ground) -> None:
-        self._recording = recording
-        self.log = log
-        self.ground = ground
+    def __init__(self, recordings: Sequence[rr.RecordingStream], log: Log) -> None:
+        self._recordings = recordings
         self.scale = min(1.0, math.sqrt(CROWD / log.is_on.shape[1]))  # of robots that are drawn [1]
+        # Half the width of what sizes on the map are shares of: the same in all pieces.
+        self.unit_m = log.facts.mission.half_side_m
+        self.log = log
+        self.ground = followed(log.position_m, log.facts.mission)
+        self.drawn = Drawn(ground=self.ground, order=neighbours_together(log))
+        self.move_on(log)
+
+    def move_on(self, piece: Log) -> None:
+        """Go on with the piece that follows."""
+        self.log = piece
+        self.ground = followed(piece.position_m, piece.facts.mission)
+        self.drawn.add_ground(self.ground)
 
     def fixed(self, entity: Entity, *archetypes: rr.AsComponents) -> None:
         """Write what never changes. It would hide the same component written in time."""
-        self._recording.log(entity.path, *archetypes, static=True)
+        for recording in self._recordings:
+            recording.log(entity.path, *archetypes, static=True)
+
+    @contextmanager
+    def only_to(self, recording: rr.RecordingStream) -> Iterator[None]:
+        """Write to this one of the recordings within it, what will be written to all later."""
+        recordings = self._recordings
+        self._recordings = [recording]
+        try:
+            yield
+        finally:
+            self._recordings = recordings
 
     def timed(
         self,
@@ -59,7 +107,9 @@ class RerunLog:
             rr.TimeColumn(TIMELINE, sequence=at),
             rr.TimeColumn("mission_time", duration=at * self.log.facts.mission.window_s),
         ]
-        self._recording.send_columns(entity.path, indexes=times, columns=list(columns))
+        shown = list(columns)
+        for recording in self._recordings:
+            recording.send_columns(entity.path, indexes=times, columns=shown)
 
     def things(
         self,

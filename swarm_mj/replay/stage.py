@@ -38,7 +38,7 @@ def draw_stage(out: RerunLog) -> None:
     mission = out.log.facts.mission
     spec = compose(mission, scene=out.log.scene)
     if not mission.has_walls:
-        _widen_floor(spec, out.ground)
+        _widen_floor(spec, out.drawn.ground)
     model = spec.compile()
     _draw_ground(out, mission)
     for name, parts in static_geoms(model).items():
@@ -61,7 +61,7 @@ def _widen_floor(spec: MjSpec, ground: Ground) -> None:
 
 
 def _draw_obstacles(out: RerunLog, outlines_m: list[Float[np.ndarray, "_ 2"]]) -> None:
-    apart_m = FILL_SHARE * out.ground.reach_m
+    apart_m = FILL_SHARE * out.unit_m
     lines = []
     for outline_m in outlines_m:
         lines += filling(outline_m, apart_m)
@@ -70,17 +70,20 @@ def _draw_obstacles(out: RerunLog, outlines_m: list[Float[np.ndarray, "_ 2"]]) -
     out.fixed(layers.OBSTACLES, layers.OBSTACLES.look(strips=outlines_m))
 
 
+def move_ground(out: RerunLog) -> None:
+    """Let the map and the scene follow the team, in an area that is open."""
+    away = lifted(-out.ground.centre_m, 0.0)
+    out.timed(layers.SCENE, rr.Transform3D.columns(translation=away))
+    # rerun shows a timed transform whole or not at all, so the mirror is repeated.
+    mirrors = np.tile(MIRROR, (len(away), 1, 1))
+    columns = rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors)
+    out.timed(layers.ARENA, columns)
+
+
 def _draw_ground(out: RerunLog, mission: Mission) -> None:
-    if out.ground.moves:
-        away = lifted(-out.ground.centre_m, 0.0)
-        out.timed(layers.SCENE, rr.Transform3D.columns(translation=away))
-        # rerun shows a timed transform whole or not at all, so the mirror is repeated.
-        mirrors = np.tile(MIRROR, (len(away), 1, 1))
-        columns = rr.Transform3D.columns(translation=away @ MIRROR, mat3x3=mirrors)
-        out.timed(layers.ARENA, columns)
-    else:
+    if mission.has_walls:
         out.fixed(layers.ARENA, rr.Transform3D(mat3x3=MIRROR))
-    strips = grid(out.ground)
+    strips = grid(out.drawn.ground)
     out.fixed(layers.GROUND_GRID, layers.GROUND_GRID.look(strips=strips))
     raised_m = lifted(np.array(strips), GRID_M)
     out.fixed(layers.SCENE_GRID, layers.SCENE_GRID.look(strips=raised_m))

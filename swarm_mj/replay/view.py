@@ -2,12 +2,14 @@
 
 import os
 import socket
+import subprocess
 import sys
-from collections.abc import Sequence
-from contextlib import ExitStack
+import time
+from collections.abc import Iterator, Sequence
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from swarm_mj.system.interrupt import answer_interrupt
 from swarm_mj.system.processes import PYTHON, running
@@ -22,6 +24,11 @@ VIEWER = (*PYTHON, "-c", START)
 NOWHERE = f"http://{LOOPBACK}:9"  # a proxy that is not there
 # With CI set rerun does not count its users; its search for newer versions has no switch.
 REPLACED = ("CI", "FORCE_RERUN_ANALYTICS", "ALL_PROXY", "HTTPS_PROXY", "HTTP_PROXY", "NO_PROXY")
+
+# Where a flight is shown while it goes on.
+WINDOW = "window"
+WEB = "web"
+OPENING_S = 60.0  # that a viewer may take to open
 
 LONGEST_S = 10.0  # of a video, unless its length is given
 SHORTEST_S = 1.0  # likewise
@@ -58,6 +65,68 @@ def serve_command(*paths: Path) -> tuple[list[str], str]:
     source = f"rerun%2Bhttp%3A%2F%2F{LOOPBACK}%3A{data_port}%2Fproxy"
     # As in a notebook, the page counts no users.
     return command, f"http://{LOOPBACK}:{page_port}/?url={source}&notebook=1"
+
+
+class LiveViewer(NamedTuple):
+    """A viewer that waits for data while a flight goes on."""
+
+    process: subprocess.Popen[bytes]
+    address: str  # where it takes data, as rerun names it
+    page: str | None  # what a browser opens; None: it is a window
+
+    def is_open(self) -> bool:
+        """Tell whether nobody has closed it."""
+        return self.process.poll() is None
+
+    def wait(self) -> int:
+        """Wait until it is closed; return 1 if it failed, 0 after Ctrl-C."""
+        try:
+            return int(self.process.wait() != 0)
+        except KeyboardInterrupt:
+            answer_interrupt()
+            return 0
+
+
+def check_live(where: str) -> None:
+    """Raise ValueError where a window was asked for, and there is no screen."""
+    if where == WINDOW and not has_display():
+        way = '--live web (in Python live="web") serves it to a browser'
+        raise ValueError(f"there is no display (DISPLAY and WAYLAND_DISPLAY are unset); {way}")
+
+
+@contextmanager
+def live_viewer(where: str) -> Iterator[LiveViewer]:
+    """Start rerun's viewer for the data of a flight: a window, or a server for a browser.
+
+    It ends with the block. Raises OSError if it cannot be started.
+    """
+    # Of this process, too: rerun's would say when a viewer is closed.
+    os.environ.setdefault("RUST_LOG", "off")
+    if where == WEB:
+        command, page = serve_command()
+        port = command[command.index("--port") + 1]
+    else:
+        page = None
+        (port,) = map(str, free_ports(1))
+        command = [*VIEWER, "--bind", LOOPBACK, "--port", port, "--expect-data-soon"]
+    with running(command, environment=quiet_environment()) as process:
+        _await_port(process, int(port))
+        address = f"rerun+http://{LOOPBACK}:{port}/proxy"
+        yield LiveViewer(process=process, address=address, page=page)
+
+
+def _await_port(process: subprocess.Popen[bytes], port: int) -> None:
+    """Wait until a viewer takes data; raise OSError if it ends before, or takes too long."""
+    deadline_s = time.monotonic() + OPENING_S
+    while time.monotonic() < deadline_s:
+        code = process.poll()
+        if code is not None:
+            lack = f"rerun's viewer ended as it was opened (exit code {code})"
+            raise OSError(f"{lack}; --live web needs no window, --record a file only")
+        with suppress(OSError), socket.create_connection((LOOPBACK, port), timeout=1.0):
+            return
+        time.sleep(0.05)
+    raise OSError(f"rerun's viewer took no data at port {port} within {OPENING_S:g} s")
 
 
 def run(command: list[str]) -> int:

@@ -15,7 +15,6 @@ import rerun_bindings as bindings
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second
 from swarm_mj.replay import charts, layers, palette, plots
-from swarm_mj.replay.footage import Ground, frame
 from swarm_mj.replay.layer_kinds import Lines, Lines3D, of_others
 from swarm_mj.replay.layout import draw_legend, layout
 from swarm_mj.replay.links import (
@@ -28,14 +27,13 @@ from swarm_mj.replay.links import (
     is_other,
     lifted,
 )
-from swarm_mj.replay.log import Log
+from swarm_mj.replay.log import LEAD_WINDOWS, Log
 from swarm_mj.replay.palette import LinkKind
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.rerun_log import RerunLog
-from swarm_mj.replay.stage import draw_stage
+from swarm_mj.replay.stage import draw_stage, move_ground
 from swarm_mj.system.writing import write_bytes
 
-TRAIL_WINDOWS = 150
 TRAIL_STRIDE = 15
 TRAIL_EVERY = 5  # windows; in between, the last one is shown
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
@@ -56,34 +54,67 @@ def write_replay(log: Log, config: Mapping[str, Any], path: Path) -> None:
 
 
 def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
-    rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    ground = frame(log.position_m, log.facts.mission.half_side_m)
-    with rr.RecordingStream(_application(log), send_properties=False) as recording:
+    with new_recording(log) as recording:
         stream = recording.binary_stream()
-        _send_layout(recording, log, ground)
-        recording.set_log_tick_enabled(False)
-        recording.set_log_time_enabled(False)
-        recording.send_recording_name(name)
-        recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
-        recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(log.facts))))
-        out = RerunLog(recording, log, ground)
+        send_properties(recording, log, config, name)
+        out = RerunLog([recording], log)
         # First: rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
         draw_stage(out)
-        draw_team(out)
-        draw_legend(out)
-        charts.draw_tree(out)
-        charts.draw_age_matrix(out)
-        charts.draw_states(out)
-        plots.draw_plots(out)
-        about = "\n".join([f"# {name}", *_about(log, config)])
-        out.fixed(layers.ABOUT, rr.TextDocument(about, media_type="text/markdown"))
+        draw_piece(out)
+        draw_whole(out, config, name)
+        plots.draw_agreement(out)
+        send_layout(recording, out)
     return stream.read() or b""
 
 
-def _send_layout(recording: rr.RecordingStream, log: Log, ground: Ground) -> None:
+def new_recording(log: Log) -> rr.RecordingStream:
+    """Return a recording of this kind of flight, which goes nowhere yet."""
+    rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
+    recording = rr.RecordingStream(_application(log), send_properties=False)
+    recording.set_log_tick_enabled(False)
+    recording.set_log_time_enabled(False)
+    return recording
+
+
+def send_properties(
+    recording: rr.RecordingStream, log: Log, config: Mapping[str, Any], name: str
+) -> None:
+    """Send what the recording is of."""
+    recording.send_recording_name(name)
+    recording.send_property("mission", rr.AnyValues(drop_untyped_nones=True, **config))
+    recording.send_property(FACTS, rr.AnyValues(json=json.dumps(asdict(log.facts))))
+
+
+def draw_piece(out: RerunLog) -> None:
+    """Draw all that changes, of a flight or of a piece of it."""
+    draw_team(out)
+    charts.draw_tree(out)
+    charts.draw_age_matrix(out)
+    charts.draw_states(out)
+    plots.draw_plots(out)
+    out.drawn.num_windows += len(out.log.window)
+    out.drawn.num_sent += int(np.sum(is_other(out.log.recipient)))
+
+
+def draw_whole(out: RerunLog, config: Mapping[str, Any], name: str) -> None:
+    """Draw what never changes and depends on all windows drawn: anew, if more of them follow."""
+    draw_legend(out)
+    charts.draw_tree_hops(out)
+    charts.draw_all_states(out)
+    about = "\n".join([f"# {name}", *_about(out, config)])
+    out.fixed(layers.ABOUT, rr.TextDocument(about, media_type="text/markdown"))
+
+
+def send_layout(
+    recording: rr.RecordingStream,
+    out: RerunLog,
+    *,
+    is_live: bool = False,
+    live_fps: float | None = None,
+) -> None:
     """Send the layout; without one, rerun makes its own."""
     try:
-        laid_out = layout(log, ground)
+        laid_out = layout(out, is_live=is_live, live_fps=live_fps)
     except (AttributeError, TypeError) as error:  # rerun calls its views unstable
         lack = f"rerun-sdk {rr.__version__} does not know a part of the layout ({error})"
         warnings.warn(f"{lack}, so the replay has rerun's own", stacklevel=2)
@@ -108,19 +139,24 @@ def _application(log: Log) -> str:
     return re.sub(r"[^a-zA-Z0-9 _-]", "-", name)  # rerun warns of other characters
 
 
-def _about(log: Log, config: Mapping[str, Any]) -> Iterator[str]:
+def _about(out: RerunLog, config: Mapping[str, Any]) -> Iterator[str]:
     for key, value in config.items():
         yield f"- **{key}**: {value}"
     if config.get("packet_bytes") is not None:
-        bits = BITS_PER_BYTE * config["packet_bytes"] * np.sum(is_other(log.recipient))
-        rate = bits / (len(log.window) * log.facts.mission.window_s)
+        bits = BITS_PER_BYTE * config["packet_bytes"] * out.drawn.num_sent
+        rate = bits / (out.drawn.num_windows * out.log.facts.mission.window_s)
         yield f"- **sent by the team**: {bits_per_second(rate)}"
+    since = plots.agreed(out)
+    if since is not None:
+        yield f"- **the flock has agreed**: from window {since} on"
 
 
 def draw_team(out: RerunLog) -> None:
     """Draw everything that moves, the same on the map and in 3-D."""
     log = out.log
-    radius_m = RADIUS_SHARE * out.ground.reach_m
+    if not log.facts.mission.has_walls:
+        move_ground(out)
+    radius_m = RADIUS_SHARE * out.unit_m
     height_m = BODY_HEIGHT * radius_m
     _draw_robots(out)
     _draw_bodies(out, radius_m, height_m)
@@ -140,6 +176,10 @@ def draw_team(out: RerunLog) -> None:
     if log.is_compared:
         _draw_mismatch(out, height_m)
         _draw_cut_off(out, radius_m)
+        out.drawn.is_any_cut_off |= bool(np.any(log.is_cut_off))
+        for kind, found in by_kind(log.mismatch.links).items():
+            if len(found) > 0:
+                out.drawn.link_kinds.add(kind)
 
 
 def _draw_robots(out: RerunLog) -> None:
@@ -150,7 +190,7 @@ def _draw_robots(out: RerunLog) -> None:
     out.points(layers.ROBOTS, where_m, colours=log.colours.reshape(-1, 3))
     row = np.arange(len(log.window))
     where_m = log.position_m[:, log.ego]
-    radius_m = 2.0 * RING_SHARE * out.ground.reach_m
+    radius_m = 2.0 * RING_SHARE * out.unit_m
     out.rings(layers.EGO, where_m, radius_m, row)
     # The name is a point's label, for rerun misplaces an ellipse's.
     name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
@@ -179,7 +219,7 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     log = out.log
     speed = np.linalg.norm(log.velocity_mps, axis=2, keepdims=True)
     # All of one length, for agreement is in directions.
-    length_m = HEADING_SHARE * out.ground.reach_m * out.scale
+    length_m = HEADING_SHARE * out.unit_m * out.scale
     way_m = length_m * log.velocity_mps / np.maximum(speed, 1e-9)
     start_m = log.position_m.reshape(-1, 2)
     end_m = (log.position_m + way_m).reshape(-1, 2)
@@ -190,9 +230,11 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
 def _draw_trails(out: RerunLog) -> None:
     log = out.log
     # Trails are drawn anew every few windows only: they would be half the file.
-    rows = np.arange(0, len(log.window), TRAIL_EVERY)
-    past = range(0, TRAIL_WINDOWS + 1, TRAIL_STRIDE)
-    trail_m = np.stack([log.position_m[np.maximum(0, rows - ago)] for ago in past], axis=2)
+    rows = np.flatnonzero((log.window - 1) % TRAIL_EVERY == 0)
+    way_m = np.concatenate([log.lead.position_m, log.position_m])
+    at = len(log.lead.position_m) + rows
+    past = range(0, LEAD_WINDOWS + 1, TRAIL_STRIDE)
+    trail_m = np.stack([way_m[np.maximum(0, at - ago)] for ago in past], axis=2)
     num_robots = trail_m.shape[1]
     out.fixed(layers.TRAILS, layers.TRAILS.look())
     columns = rr.LineStrips2D.columns(strips=trail_m.reshape(-1, len(past), 2))
@@ -204,7 +246,7 @@ def _draw_beliefs(out: RerunLog) -> None:
     row, other = np.nonzero(log.is_other_known)
     believed_m = log.believed_m[row, other]
     out.lines(layers.BELIEF_ERROR, believed_m, log.position_m[row, other], row)
-    out.rings(layers.BELIEF, believed_m, RING_SHARE * out.ground.reach_m, row)
+    out.rings(layers.BELIEF, believed_m, RING_SHARE * out.unit_m, row)
 
 
 def _draw_radio(out: RerunLog) -> None:
@@ -230,7 +272,7 @@ def _draw_packets(out: RerunLog) -> None:
         origins_m = packets.start_m
         if fate in ("answered", "unanswered"):  # an answer stands beside its request, to the left
             length_m = np.maximum(np.linalg.norm(way_m, axis=1, keepdims=True), 1e-6)
-            aside_m = ASIDE_SHARE * out.ground.reach_m
+            aside_m = ASIDE_SHARE * out.unit_m
             origins_m = origins_m + aside_m * (way_m[:, ::-1] * (-1.0, 1.0) / length_m)
         vectors_m = palette.PACKETS[fate].share * way_m
         out.arrows(layers.PACKET_ARROWS[fate], origins_m, vectors_m, packets.row)

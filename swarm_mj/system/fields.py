@@ -71,6 +71,7 @@ class Meaning:
     flag: str = ""  # its option, if that is not made from its name
     convert: Callable[[str], object] | None = None  # makes the value of what was typed
     reads: Callable[[Any], Iterable[Path]] | None = None  # files to read that a value names
+    bare: str | None = None  # its value if the flag is typed without one; None: it needs one
     is_positional: bool = False  # whether the option has no flag
     is_common: bool = False  # whether `--help` shows it, and does not leave it to `--help-all`
 
@@ -102,6 +103,7 @@ class MeaningFields(TypedDict, total=False):
     flag: str
     convert: Callable[[str], object] | None
     reads: Callable[[Any], Iterable[Path]] | None
+    bare: str | None
     is_positional: bool
     is_common: bool
 

@@ -5,8 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from swarm_mj.mission import paper
 from swarm_mj.replay import palette
-from swarm_mj.replay.footage import frame
+from swarm_mj.replay.footage import followed, frame
 from swarm_mj.replay.links import LINK, LinkMismatch
 from swarm_mj.replay.read import read_footage
 from swarm_mj.replay.write import write_replay
@@ -96,3 +97,22 @@ def test_a_team_that_flies_off_is_followed(farthest_m, moves):
     assert shown.moves == moves
     assert shown.reach_m == pytest.approx(farthest_m / 2 if moves else max(100.0, farthest_m))
     assert shown.centre_m[1, 1] == pytest.approx(-farthest_m / 2 if moves else 0.0)
+
+
+@pytest.mark.parametrize(
+    ("low_m", "high_m", "centre_m"),
+    [(-50.0, 119.0, 0.0), (-50.0, 130.0, 10.0), (-130.0, 50.0, -10.0), (100.0, 500.0, 300.0)],
+)
+def test_an_open_map_moves_no_more_than_keeps_the_team_in_view(low_m, high_m, centre_m):
+    """An area of half side 100 m and a view of 120 m; a team wider than it is in the middle."""
+    mission = paper("flocking", num_robots=4, density_per_km2=100.0)
+    assert mission.half_side_m == pytest.approx(100.0)
+    position_m = np.zeros((2, 4, 2))
+    position_m[1, 0, 0] = low_m
+    position_m[1, 1:, 0] = high_m
+    shown = followed(position_m, mission)
+    np.testing.assert_allclose(shown.centre_m, [[0.0, 0.0], [centre_m, 0.0]], atol=1e-9)
+    farthest_m = max(abs(low_m - centre_m), abs(high_m - centre_m), 100.0)
+    assert shown.reach_m == pytest.approx(farthest_m)
+    walled = followed(position_m, replace(mission, boundary="reflect"))
+    assert not walled.moves

@@ -20,15 +20,6 @@ def test_older_is_darker_until_the_scale_ends():
     assert tuple(beyond) == tuple(at_end)
 
 
-@pytest.mark.parametrize(
-    ("age", "scale"), [(0.2, 1.0), (3.4, 4.0), (42.0, 50.0), (51.0, 100.0), (100.0, 100.0)]
-)
-def test_the_full_scale_is_round_and_reaches_19_ages_in_20(age, scale):
-    ages = np.full(100, age)
-    ages[:4] = 1e4
-    assert palette.nice_scale(ages) == scale
-
-
 @pytest.mark.parametrize(("value", "top"), [(0.0, 1.0), (6.4, 10.0), (1.2, 1.5), (0.003, 0.003)])
 def test_axes_end_at_round_numbers(value, top):
     assert palette.nice_top(value) == pytest.approx(top)

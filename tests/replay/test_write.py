@@ -232,14 +232,18 @@ def test_what_a_mission_lacks_is_not_drawn(replay, still_replay, flood_replay):
     assert radio == shown | {"/plots/radio/heard", "/plots/radio/sent"}
 
 
-def test_a_map_that_follows_the_team_keeps_it_in_the_middle(two_way, tmp_path):
+def test_a_map_that_follows_the_team_keeps_it_in_view(two_way, tmp_path):
     """North stays up: what is shown of p is p - c with y turned round."""
     drift = np.linspace(0.0, 9e3, 30)[:, None, None] * np.array([1.0, 0.5])
-    log, far = replace(two_way.log, position_m=two_way.log.position_m + drift), tmp_path / "far.rrd"
+    facts = two_way.log.facts
+    facts = replace(facts, mission=replace(facts.mission, boundary="none"))
+    log = replace(two_way.log, facts=facts, position_m=two_way.log.position_m + drift)
+    far = tmp_path / "far.rrd"
     write_replay(log, {"seed": 5}, far)
     north_up = [[1, 0, 0, 0, -1, 0, 0, 0, 1]] * 30
     np.testing.assert_array_equal(rows(far, "/arena", "Transform3D:mat3x3", 9), north_up)
     shift = rows(far, "/arena", "Transform3D:translation", 3)[:, None, :2]
     shown = log.position_m * (1.0, -1.0) + shift
-    middle = (shown.min(axis=1) + shown.max(axis=1)) / 2.0
-    np.testing.assert_allclose(middle, 0.0, atol=1e-3)
+    farthest_m = np.abs(shown).max(axis=(1, 2))
+    assert np.all(farthest_m[1:] == pytest.approx(1.2 * facts.mission.half_side_m, rel=1e-4))
+    assert farthest_m[0] < facts.mission.half_side_m

@@ -8,7 +8,6 @@ import pytest
 from rich.console import Console
 
 from swarm_mj.system import terminal
-from swarm_mj.system import terminal
 from swarm_mj.system.terminal import WorkBar, plain_console, this_command
 
 
