@@ -8,7 +8,6 @@ import rerun as rr
 from jaxtyping import Bool, Float, Int, Shaped
 
 from swarm_mj.replay import layers, palette
-from swarm_mj.replay.layer_kinds import Entity
 from swarm_mj.replay.log import REQUEST, RESPONSE, Log
 from swarm_mj.replay.palette import Colour, RadioState
 from swarm_mj.replay.rerun_log import RerunLog
@@ -91,7 +90,8 @@ def draw_age_matrix(out: RerunLog) -> None:
     names = [f"{age:.0f} windows" for age in ages[:-1]] + [f"{full_scale:g} windows or more"]
     colours = palette.age_colours(ages, full_scale).tolist()
     shape = (len(order), len(order))
-    _draw_classes(out, layers.AGES, shape, names, colours, TREE_SIZE)
+    for still in _classes(shape, names, colours, TREE_SIZE):
+        out.look(layers.AGES, still)
     if len(shades) == 0:  # a large team's matrix is kept every few pieces only
         return
     columns = rr.SegmentationImage.columns(buffer=shades.reshape(len(shades), -1))
@@ -120,7 +120,8 @@ def draw_all_states(out: RerunLog) -> None:
     colours = _state_colours(out.log)
     shades = np.concatenate(out.drawn.states).T
     names = list(colours)
-    _draw_classes(out, layers.STATES, shades.shape, names, list(colours.values()), STATES_SIZE)
+    for still in _classes(shades.shape, names, list(colours.values()), STATES_SIZE):
+        out.fixed(layers.STATES, still)
     image = rr.SegmentationImage.from_fields(buffer=shades.tobytes())
     out.fixed(layers.STATES, image)
     num_robots, num_windows = shades.shape
@@ -136,23 +137,23 @@ def draw_all_states(out: RerunLog) -> None:
     out.words(layers.STATE_WINDOWS, [str(window) for window in ticks], places)
 
 
-def _draw_classes(
-    out: RerunLog,
-    entity: Entity,
+def _classes(
     shape: Sequence[int],
     names: Sequence[str],
     colours: Sequence[Sequence[int]],
     size: tuple[float, float],
-) -> None:
-    """Prepare an image of classes, each a name and a colour, as large as this in its view."""
+) -> list[rr.AsComponents]:
+    """Return what makes an image one of classes, names with colours, as large as its view."""
     # rerun's own views of tensors and of states write over them, and show short states as grey.
     classes = [(k, name, colours[k]) for k, name in enumerate(names)]
-    out.fixed(entity, rr.AnnotationContext(classes))
     height, width = shape
     x, y = size
     form = rr.components.ImageFormat(height=height, width=width, channel_datatype="U8")
-    out.fixed(entity, rr.SegmentationImage.from_fields(format=form, opacity=1.0))
-    out.fixed(entity, rr.Transform3D(mat3x3=np.diag([x / width, y / height, 1.0])))
+    return [
+        rr.AnnotationContext(classes),
+        rr.SegmentationImage.from_fields(format=form, opacity=1.0),
+        rr.Transform3D(mat3x3=np.diag([x / width, y / height, 1.0])),
+    ]
 
 
 def radio_states(log: Log) -> Shaped[np.ndarray, "T N"]:

@@ -204,5 +204,5 @@ def _draw_curve(out: RerunLog, curve: PlotCurve) -> None:
     else:
         line = rr.Measurements.from_fields(widths=[2.0], colors=colours, names=names)
         columns = rr.Measurements.columns(values=curve.values, variances=curve.std**2)
-    out.fixed(curve.entity, line)
+    out.look(curve.entity, line)
     out.timed(curve.entity, columns, curve.window)

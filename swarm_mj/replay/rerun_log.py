@@ -71,18 +71,25 @@ class RerunLog:
         self.log = log
         self.ground = followed(log.position_m, log.facts.mission)
         self.drawn = Drawn(ground=self.ground, order=neighbours_together(log))
-        self.move_on(log)
+        self.drawn.add_ground(self.ground)
+        self._is_first = True
 
     def move_on(self, piece: Log) -> None:
         """Go on with the piece that follows."""
         self.log = piece
         self.ground = followed(piece.position_m, piece.facts.mission)
         self.drawn.add_ground(self.ground)
+        self._is_first = False
 
     def fixed(self, entity: Entity, *archetypes: rr.AsComponents) -> None:
         """Write what never changes. It would hide the same component written in time."""
         for recording in self._recordings:
             recording.log(entity.path, *archetypes, static=True)
+
+    def look(self, entity: Entity, *archetypes: rr.AsComponents) -> None:
+        """Write with the first piece how the things look that every piece has."""
+        if self._is_first:
+            self.fixed(entity, *archetypes)
 
     @contextmanager
     def only_to(self, recording: rr.RecordingStream) -> Iterator[None]:
@@ -136,7 +143,7 @@ class RerunLog:
         self, layer: Lines | Lines3D, strips: Strips, row: Int[np.ndarray, "L"] | None = None
     ) -> None:
         """Write lines through several points each."""
-        self.fixed(layer, layer.look())
+        self.look(layer, layer.look())
         self.things(layer, layer.columns(strips), row)
 
     def lines(
@@ -153,7 +160,7 @@ class RerunLog:
         self, layer: Arrows, origins: Places, vectors: Places, row: Int[np.ndarray, "L"]
     ) -> None:
         """Write arrows."""
-        self.fixed(layer, layer.look())
+        self.look(layer, layer.look())
         self.things(layer, rr.Arrows2D.columns(origins=origins, vectors=vectors), row)
 
     def points(
@@ -165,14 +172,14 @@ class RerunLog:
     ) -> None:
         """Write points, each in its colour if the layer has none."""
         scale = self.scale if layer.shrinks else 1.0
-        self.fixed(layer, layer.look(scale=scale))
+        self.look(layer, layer.look(scale=scale))
         self.things(layer, rr.Points2D.columns(positions=positions, colors=colours), row)
 
     def rings(
         self, layer: Rings, centre: Places, radius_m: float, row: Int[np.ndarray, "L"]
     ) -> None:
         """Write circles of one size."""
-        self.fixed(layer, layer.look())
+        self.look(layer, layer.look())
         half_sizes = np.full(centre.shape, radius_m)
         self.things(layer, rr.Ellipses2D.columns(centers=centre, half_sizes=half_sizes), row)
 
@@ -184,7 +191,7 @@ class RerunLog:
         at_m: Float[np.ndarray, "L 2 A"],
     ) -> None:
         """Write a line for each of these links; those who click on one read its numbers."""
-        self.fixed(layer, layer.look())
+        self.look(layer, layer.look())
         columns = layer.columns(at_m, shades(kind, links))
         # By the names in `links.NUMBERS`, under which `read` finds them.
         numbers = rr.AnyValues.columns(

@@ -185,7 +185,7 @@ def draw_team(out: RerunLog) -> None:
 def _draw_robots(out: RerunLog) -> None:
     log = out.log
     names = [f"r{i}" for i in range(log.parent.shape[1])]
-    out.fixed(layers.ROBOTS, rr.Points2D.from_fields(labels=names, show_labels=False))
+    out.look(layers.ROBOTS, rr.Points2D.from_fields(labels=names, show_labels=False))
     where_m = log.position_m.reshape(-1, 2)
     out.points(layers.ROBOTS, where_m, colours=log.colours.reshape(-1, 3))
     row = np.arange(len(log.window))
@@ -194,7 +194,7 @@ def _draw_robots(out: RerunLog) -> None:
     out.rings(layers.EGO, where_m, radius_m, row)
     # The name is a point's label, for rerun misplaces an ellipse's.
     name = rr.Points2D.from_fields(labels=[f"r{log.ego}"], show_labels=True)
-    out.fixed(layers.EGO_NAME, name)
+    out.look(layers.EGO_NAME, name)
     out.points(layers.EGO_NAME, where_m - (0.0, 3.0 * radius_m), row)
 
 
@@ -204,7 +204,7 @@ def _draw_bodies(out: RerunLog, radius_m: float, height_m: float) -> None:
     radii = np.full(log.is_on.shape[1], radius_m)
     radii[log.ego] *= OBSERVER
     lengths = np.full(len(radii), height_m)
-    out.fixed(entity, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
+    out.look(entity, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
     where_m = lifted(log.position_m.reshape(-1, 2), height_m / 2.0)
     colours = log.colours.reshape(-1, 3)
     out.things(entity, rr.Cylinders3D.columns(centers=where_m, colors=colours))
@@ -236,7 +236,7 @@ def _draw_trails(out: RerunLog) -> None:
     past = range(0, LEAD_WINDOWS + 1, TRAIL_STRIDE)
     trail_m = np.stack([way_m[np.maximum(0, at - ago)] for ago in past], axis=2)
     num_robots = trail_m.shape[1]
-    out.fixed(layers.TRAILS, layers.TRAILS.look())
+    out.look(layers.TRAILS, layers.TRAILS.look())
     columns = rr.LineStrips2D.columns(strips=trail_m.reshape(-1, len(past), 2))
     out.timed(layers.TRAILS, columns.partition([num_robots] * len(rows)), log.window[rows])
 
@@ -325,7 +325,7 @@ def _draw_cut_off(out: RerunLog, radius_m: float) -> None:
     where_m = log.position_m[row, robot]
     out.points(layers.CUT_OFF, where_m, row)
     entity = layers.SCENE_CUT_OFF
-    out.fixed(entity, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
+    out.look(entity, rr.Cylinders3D.from_fields(colors=[palette.CUT_OFF], fill_mode="solid"))
     radii = np.full(len(row), palette.HALO * radius_m)
     lengths = np.full(len(row), HALO_M)
     halos = rr.Cylinders3D.columns(centers=lifted(where_m, 0.0), radii=radii, lengths=lengths)
