@@ -30,12 +30,6 @@ class Ground:
         """True if it follows the team."""
         return bool(np.any(self.centre_m))
 
-    def is_like(self, other: "Ground | None") -> bool:
-        """Tell whether another one is as large, and lies as far."""
-        if other is None or self.reach_m != other.reach_m:
-            return False
-        return np.array_equal(self.centre_m, other.centre_m)
-
 
 def frame(position_m: Positions, half_side_m: float, *, is_tight: bool = False) -> Ground:
     """Return the smallest square that holds the area and all ways, or else all robots at any time.

@@ -15,13 +15,15 @@ import rerun as rr
 import rerun_bindings as bindings
 
 from swarm_mj.replay import plots
-from swarm_mj.replay.footage import Ground
+from swarm_mj.replay.layer_kinds import Point
+from swarm_mj.replay.layout import draw_legend
 from swarm_mj.replay.log import Log
 from swarm_mj.replay.read import with_digest
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.rerun_log import RerunLog
-from swarm_mj.replay.stage import draw_stage
+from swarm_mj.replay.stage import draw_stage, grid
 from swarm_mj.replay.write import (
+    draw_growing,
     draw_piece,
     draw_whole,
     new_recording,
@@ -30,8 +32,8 @@ from swarm_mj.replay.write import (
 )
 from swarm_mj.system.writing import write_bytes
 
-# To draw a flight in pieces takes some 10 ms a piece longer than to draw it whole.
-BETWEEN_PIECES_S = 0.15
+# A flight that is drawn in pieces takes some 20 ms a piece longer than one that is drawn whole.
+BETWEEN_PIECES_S = 0.25
 FLUSH_S = 10.0  # that a viewer may take to get what was sent
 
 
@@ -79,7 +81,7 @@ class LiveReplay:
         self._next_s = 0.0
         self._num_drawn = 0  # windows
         self._out: RerunLog | None = None
-        self._ground: Ground | None = None  # that the viewer shows
+        self._grid: list[list[Point]] = []  # that the viewer shows
         self._recordings: _Recordings | None = None
 
     def show(self) -> None:
@@ -107,10 +109,11 @@ class LiveReplay:
         self._num_drawn = until
         assert self._recordings is not None
         with self._out.only_to(self._recordings.viewer):
-            if not self._out.drawn.ground.is_like(self._ground):
-                self._ground = self._out.drawn.ground
+            lines = grid(self._out.drawn.ground)
+            if lines != self._grid:  # the team has flown beyond
+                self._grid = lines
                 draw_stage(self._out)
-            draw_whole(self._out, self._config, self._name)
+            draw_growing(self._out)
 
     def _begin(self, piece: Log) -> RerunLog:
         """Return what draws, once the first piece says what kind of flight it is."""
@@ -122,10 +125,11 @@ class LiveReplay:
         for recording in self._recordings.all:
             send_properties(recording, piece, self._config, self._name)
         out = RerunLog(self._recordings.all, piece)
-        self._ground = out.drawn.ground
+        self._grid = grid(out.drawn.ground)
         # First: rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
         with out.only_to(viewer):
             draw_stage(out)
+            draw_legend(out)
         send_layout(viewer, out, live_fps=self._windows_per_second, is_live=True)
         return out
 
@@ -136,11 +140,11 @@ class LiveReplay:
         out = self._out
         if out is None or self._recordings is None:  # nothing was flown
             return
+        draw_whole(out, self._config, self._name)
         plots.draw_agreement(out)
         if self._recordings.file is not None:
             with out.only_to(self._recordings.file):
                 draw_stage(out)
-                draw_whole(out, self._config, self._name)
             send_layout(self._recordings.file, out)
         with suppress(RuntimeError):  # the viewer was closed
             self._recordings.viewer.flush(timeout_sec=FLUSH_S)

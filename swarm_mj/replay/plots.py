@@ -188,7 +188,13 @@ def draw_agreement(out: RerunLog) -> None:
     since = agreed(out)
     if since is None:
         return
-    look = rr.SeriesLines(widths=[1.6], colors=[palette.AGREED], names=["the flock has agreed"])
+    # Without aggregation: the viewer would draw the mean of both ends.
+    look = rr.SeriesLines(
+        widths=[1.6],
+        colors=[palette.AGREED],
+        names=["the flock has agreed"],
+        aggregation_policy=rr.components.AggregationPolicy.Off,
+    )
     out.fixed(layers.AGREED, look)
     top = palette.nice_top(out.drawn.tops[layers.COST_PLOT.path])
     both_ends = rr.Scalars.columns(scalars=[0.0, top])

@@ -96,11 +96,16 @@ def draw_piece(out: RerunLog) -> None:
     out.drawn.num_sent += int(np.sum(is_other(out.log.recipient)))
 
 
-def draw_whole(out: RerunLog, config: Mapping[str, Any], name: str) -> None:
-    """Draw what never changes and depends on all windows drawn: anew, if more of them follow."""
-    draw_legend(out)
+def draw_growing(out: RerunLog) -> None:
+    """Draw what grows with every piece and shows all windows so far."""
     charts.draw_tree_hops(out)
     charts.draw_all_states(out)
+
+
+def draw_whole(out: RerunLog, config: Mapping[str, Any], name: str) -> None:
+    """Draw what never changes and depends on all windows of the flight."""
+    draw_legend(out)
+    draw_growing(out)
     about = "\n".join([f"# {name}", *_about(out, config)])
     out.fixed(layers.ABOUT, rr.TextDocument(about, media_type="text/markdown"))
 
