@@ -86,16 +86,24 @@ def draw_age_matrix(out: RerunLog) -> None:
     shades = np.empty((len(log.age), len(order), len(order)), dtype=np.uint8)
     for k, age in enumerate(log.age):  # one by one: copies of all would take most of the memory
         shades[k] = np.rint(OLDEST * np.minimum(age[shown] / full_scale, 1.0))
+    if out.is_first:
+        _draw_scale(out)
+    if len(shades) == 0:  # a large team's matrix is kept every few pieces only
+        return
+    columns = rr.SegmentationImage.columns(buffer=shades.reshape(len(shades), -1))
+    out.timed(layers.AGES, columns, log.age_window)
+
+
+def _draw_scale(out: RerunLog) -> None:
+    """Say what the matrix's shades mean: a class for each of 256 takes a while to make."""
+    full_scale = out.log.facts.full_scale
+    order = out.drawn.order
     ages = np.linspace(0.0, full_scale, OLDEST + 1)
     names = [f"{age:.0f} windows" for age in ages[:-1]] + [f"{full_scale:g} windows or more"]
     colours = palette.age_colours(ages, full_scale).tolist()
     shape = (len(order), len(order))
     for still in _classes(shape, names, colours, TREE_SIZE):
-        out.look(layers.AGES, still)
-    if len(shades) == 0:  # a large team's matrix is kept every few pieces only
-        return
-    columns = rr.SegmentationImage.columns(buffer=shades.reshape(len(shades), -1))
-    out.timed(layers.AGES, columns, log.age_window)
+        out.fixed(layers.AGES, still)
 
 
 def draw_states(out: RerunLog) -> None:

@@ -72,14 +72,14 @@ class RerunLog:
         self.ground = followed(log.position_m, log.facts.mission)
         self.drawn = Drawn(ground=self.ground, order=neighbours_together(log))
         self.drawn.add_ground(self.ground)
-        self._is_first = True
+        self.is_first = True
 
     def move_on(self, piece: Log) -> None:
         """Go on with the piece that follows."""
         self.log = piece
         self.ground = followed(piece.position_m, piece.facts.mission)
         self.drawn.add_ground(self.ground)
-        self._is_first = False
+        self.is_first = False
 
     def fixed(self, entity: Entity, *archetypes: rr.AsComponents) -> None:
         """Write what never changes. It would hide the same component written in time."""
@@ -88,7 +88,7 @@ class RerunLog:
 
     def look(self, entity: Entity, *archetypes: rr.AsComponents) -> None:
         """Write with the first piece how the things look that every piece has."""
-        if self._is_first:
+        if self.is_first:
             self.fixed(entity, *archetypes)
 
     @contextmanager
