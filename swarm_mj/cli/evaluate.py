@@ -1,5 +1,6 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
+import math
 import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
@@ -11,6 +12,8 @@ from typing import ClassVar
 
 from rich.console import Console
 
+from swarm_mj.api.flight import Flight, fly_mission
+from swarm_mj.api.live import LiveFlight, check_live, live_option, open_viewer, speed_option
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.evaluation import flying
@@ -24,6 +27,7 @@ from swarm_mj.evaluation.summary import study_results, write_evaluated
 from swarm_mj.evaluation.table import print_results
 from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
+from swarm_mj.replay.view import LiveViewer
 from swarm_mj.system.exit_codes import DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import common_setting, files_read, same_as
 from swarm_mj.system.interrupt import deferred_interrupt
@@ -77,6 +81,11 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
     seed: int = same_as(Study, "seed")
     baseline: str | None = same_as(Study, "baseline")
     missions: tuple[Mission, ...] = several_missions()
+    live: str | None = live_option(
+        help="first show the first policy's first mission while it flies, in rerun's viewer or, "
+        "with web, in a browser; it stays open until you close it"
+    )
+    speed: float | None = speed_option()
 
     @property
     def study(self) -> Study:
@@ -99,7 +108,38 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
 
 def run(options: EvaluateOptions) -> int:
     """Run the command; return its exit code."""
-    return run_study(options, options.study)
+    check_live(options.live, options.speed)
+    study = options.study
+    if options.live is None:
+        return run_study(options, study)
+    console = Console(stderr=True, highlight=False)
+    with open_viewer(options.live, console) as viewer:
+        code = _show_first(options, study, viewer, console)
+        if code == DONE:
+            code = run_study(options, study)
+        return viewer.wait() if code == DONE else code
+
+
+def _show_first(
+    options: EvaluateOptions, study: Study, viewer: LiveViewer, console: Console
+) -> int:
+    """Fly the first policy's first mission, as the study will, and show it; return the code."""
+    first = study.batches[0]
+    policy = first.policy
+    flight = Flight(
+        mission=first.mission,
+        policy=registry.make_policy_with(first.arguments, policy, first.mission),
+        policy_name=policy,
+        arguments=first.arguments,
+        components=study.components,
+        seed=study.seed,
+        speed=math.inf if options.speed is None else options.speed,
+    )
+    live = LiveFlight(viewer, f"{policy}, seed {study.seed}", speed=options.speed)
+    flown = fly_mission(flight, console=console, way_on=None, shows=live.begin)
+    if flown.ending:
+        console.print(f"{flown.ending}.")
+    return flown.code
 
 
 def run_study(options: StudyFlags, study: Study) -> int:

@@ -59,7 +59,7 @@ class LiveReplay:
         name: str,
         address: str,
         *,
-        has_file: bool,
+        has_file: bool = False,
         windows_per_second: float | None = None,
     ) -> None:
         """Prepare to show a flight.

@@ -1,14 +1,18 @@
 """A flight that is shown in pieces has the rows of the one that is drawn whole."""
 
+import signal
+import subprocess
+import sys
 from collections import defaultdict
 
 import numpy as np
 import pytest
+from browsing import CHROMIUM, browser, page_of, share_of, until
 from rerun.chunk import RrdReader
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
-from swarm_mj.replay import live
+from swarm_mj.replay import live, palette
 from swarm_mj.replay.live import LiveReplay
 from swarm_mj.replay.read import check_replay, read_footage
 from swarm_mj.replay.recorder import Recorder
@@ -84,3 +88,67 @@ def test_a_flight_shown_in_pieces_has_the_rows_of_the_whole_one(name, nowhere, t
     seen, expected = (read_footage(tmp_path / f"{each}.rrd") for each in ("pieces", "a"))
     assert seen.facts == expected.facts
     np.testing.assert_array_equal(seen.position_m, expected.position_m)
+
+
+@pytest.mark.parametrize(("between_s", "num_drawn"), [(0.0, 75), (1e9, 25)])
+def test_pieces_are_whole_and_come_no_more_often_than_they_may(
+    between_s, num_drawn, nowhere, monkeypatch
+):
+    """So that a fast flight is not held up: the rest is drawn in the end, in one piece."""
+    monkeypatch.setattr(live, "BETWEEN_PIECES_S", between_s)
+    _, shown = flown("addressed", lambda record: LiveReplay(record, CONFIG, "a", nowhere))
+    assert shown._num_drawn == num_drawn
+    shown.finish()
+    assert shown._num_drawn == 90
+
+
+def test_a_viewer_that_was_closed_ends_no_flight(nowhere, monkeypatch, tmp_path):
+    def closed(*_, **__):
+        raise RuntimeError("gRPC connection severed")
+
+    _, shown = flown(
+        "addressed", lambda record: LiveReplay(record, CONFIG, "a", nowhere, has_file=True)
+    )
+    monkeypatch.setattr(live.rr.RecordingStream, "flush", closed)
+    shown.finish()
+    monkeypatch.undo()
+    shown.save(tmp_path / "a.rrd")
+    assert len(read_footage(tmp_path / "a.rrd").window) == 90
+
+
+def test_a_flight_without_a_window_is_nothing_to_show(nowhere):
+    swarm = Swarm(paper(num_robots=4), [1])
+    LiveReplay(Recorder(swarm), CONFIG, "a", nowhere).finish()
+
+
+def test_a_piece_begins_with_a_snapshot_of_the_radio():
+    """Every fourth window has one, so that pieces of 28 windows do."""
+    swarm = Swarm(paper("random-walk", num_robots=4), [1])
+    record = Recorder(swarm)
+    assert record.piece_windows % record._radio_stride == 0
+    record._radio_stride = 4
+    assert record.piece_windows == 28
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="it needs Chromium")
+def test_a_browser_shows_the_flight_while_it_goes_on_and_ctrl_c_keeps_it(tmp_path):
+    """Our plots have a ground of their own; the map changes while the flight has not ended."""
+    path = tmp_path / "a.rrd"
+    flight = ("--policy", "tdma", "--windows", "100000", "--live", "web", "--speed", "4")
+    command = [sys.executable, "-m", "swarm_mj", "fly", *flight, "--record", str(path)]
+    with (tmp_path / "said.txt").open("w+") as said:
+        flying = subprocess.Popen(command, stdout=said, stderr=said)
+        try:
+            address = until(lambda: page_of(said))
+            with browser(address, tmp_path) as screenshot:
+                until(lambda: share_of(palette.PLOT, screenshot()) > 0.1, limit_s=120.0)
+                before = screenshot()
+                until(lambda: np.mean(screenshot() != before) > 1e-3, limit_s=60.0)
+            assert flying.poll() is None
+            assert not path.exists()
+        finally:
+            flying.send_signal(signal.SIGINT)
+            flying.wait(timeout=60)
+    assert flying.returncode == 130
+    assert len(read_footage(path).window) >= 25

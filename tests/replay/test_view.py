@@ -1,29 +1,21 @@
 """Replays open where there is a display, else in a browser; a video lasts as long as meant."""
 
-import base64
-import io
-import json
 import os
-import shutil
 import subprocess
 import sys
 import tempfile
-import time
-import urllib.request
-from contextlib import contextmanager, suppress
 from pathlib import Path
 from types import SimpleNamespace
 
-import numpy as np
 import pytest
-from PIL import Image
-from websockets.sync.client import connect
+from browsing import CHROMIUM, browser, page_of, share_of, until
 
-from swarm_mj.replay import palette
+from swarm_mj.replay import palette, view
 from swarm_mj.replay.view import (
     LOOPBACK,
     VIEWER,
     VideoStyle,
+    check_live,
     default_seconds,
     fitted,
     quiet_environment,
@@ -31,10 +23,8 @@ from swarm_mj.replay.view import (
     serve_command,
     view_command,
 )
-from swarm_mj.system.processes import running
 
 FILE = Path("some where") / "mission.rrd"
-CHROMIUM = shutil.which("chromium") or shutil.which("google-chrome")
 
 
 def test_a_window_needs_a_display(monkeypatch):
@@ -93,27 +83,6 @@ def served(replay):
     assert server.returncode == 0
 
 
-def until(found, limit_s=60.0):
-    """What a function finds, asked until it finds something."""
-    deadline = time.monotonic() + limit_s
-    while time.monotonic() < deadline:
-        if answer := found():
-            return answer
-        time.sleep(0.2)
-    raise AssertionError(f"nothing within {limit_s:g} s")
-
-
-def page_of(said):
-    """The page's address, once it is named and answers."""
-    said.seek(0)
-    for line in said.read().splitlines():
-        if line.startswith("Open http"):
-            address = line.split()[1]
-            with suppress(OSError), urllib.request.urlopen(address, timeout=30) as page:
-                return address if b"rerun" in page.read().lower() else None
-    return None
-
-
 @pytest.mark.slow
 def test_the_page_is_served_and_no_address_but_its_own_is_shown(served):
     address, said = served
@@ -127,43 +96,6 @@ def test_a_browser_opens_with_our_layout(served, tmp_path):
     """Our plots have a ground of their own, which no view of rerun's automatic grid has."""
     with browser(served[0], tmp_path) as screenshot:
         until(lambda: share_of(palette.PLOT, screenshot()) > 0.1, limit_s=120.0)
-
-
-def share_of(colour, picture):
-    """The share of pixels of a colour, within what encoders change."""
-    return np.mean(np.all(np.abs(picture - np.array(colour)) <= 2, axis=2))
-
-
-@contextmanager
-def browser(address, profile):
-    """A headless Chromium that shows a page; it yields a function that takes its picture."""
-    options = (
-        *("--headless=new", "--no-sandbox", "--no-first-run", "--window-size=1600,1000"),
-        *("--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader"),
-        *("--remote-debugging-port=0", f"--user-data-dir={profile}"),
-        *("--disable-background-networking", "--disable-component-update", "--disable-sync"),
-    )
-    with (
-        (profile / "said.txt").open("w") as said,
-        running([CHROMIUM, *options, address], output=said),
-    ):
-        port = until(lambda: "".join(port_lines(profile)[:1]))
-        with urllib.request.urlopen(f"http://127.0.0.1:{port}/json") as pages:
-            (page,) = [one for one in json.load(pages) if one["type"] == "page"]
-        with connect(page["webSocketDebuggerUrl"], max_size=None, proxy=None) as socket:
-
-            def screenshot():
-                socket.send(json.dumps({"id": 1, "method": "Page.captureScreenshot"}))
-                png = base64.b64decode(json.loads(socket.recv())["result"]["data"])
-                return np.asarray(Image.open(io.BytesIO(png)).convert("RGB"), dtype=int)
-
-            yield screenshot
-
-
-def port_lines(profile):
-    """The port that Chromium listens on, and more, once it does."""
-    file = profile / "DevToolsActivePort"
-    return file.read_text().splitlines() if file.exists() else []
 
 
 def test_what_fails_is_said(tmp_path, capfd):
@@ -194,3 +126,36 @@ def test_missions_are_shown_in_their_own_time_within_reason(num_windows, seconds
     facts = SimpleNamespace(mission=SimpleNamespace(window_s=0.1))
     footages = [SimpleNamespace(window=range(number), facts=facts) for number in num_windows]
     assert default_seconds(footages) == pytest.approx(seconds)
+
+
+def test_a_live_flight_needs_a_display_or_a_browser(monkeypatch):
+    monkeypatch.setattr(sys, "platform", "linux")
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    with pytest.raises(ValueError, match=r"no display .*; --live web"):
+        check_live("window")
+    check_live("web")
+
+
+def test_a_viewer_that_does_not_open_is_said_in_a_line(monkeypatch):
+    monkeypatch.setattr(view, "VIEWER", (sys.executable, "-c", "raise SystemExit(3)"))
+    with pytest.raises(OSError, match=r"ended as it was opened \(exit code 3\); --live web"):
+        view.live_viewer("window").__enter__()
+
+
+def test_a_viewer_that_takes_no_data_is_given_up(monkeypatch):
+    monkeypatch.setattr(view, "VIEWER", (sys.executable, "-c", "import time; time.sleep(60)"))
+    monkeypatch.setattr(view, "OPENING_S", 0.3)
+    with pytest.raises(OSError, match=r"took no data at port \d+ within 0.3 s"):
+        view.live_viewer("window").__enter__()
+
+
+@pytest.mark.slow
+def test_the_server_of_a_live_flight_takes_data_and_ends_with_the_block():
+    with view.live_viewer("web") as viewer:
+        assert viewer.page.startswith("http://127.0.0.1:")
+        assert viewer.address.split("/proxy")[0].split("//")[1] in viewer.page.replace(
+            "%3A", ":"
+        ).replace("%2F", "/")
+        assert viewer.is_open()
+    assert not viewer.is_open()
