@@ -10,7 +10,7 @@ import time
 from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import asdict, dataclass, replace
-from typing import Any, NamedTuple, Protocol, TypeAlias
+from typing import Any, NamedTuple, Protocol, TypeAlias, runtime_checkable
 
 import numpy as np
 from rich.console import Console
@@ -72,6 +72,7 @@ class Flight:
         }
 
 
+@runtime_checkable
 class Shown(Protocol):
     """Shows a flight while it goes on: `swarm_mj.replay.live.LiveReplay`."""
 

@@ -74,10 +74,6 @@ class LiveViewer(NamedTuple):
     address: str  # where it takes data, as rerun names it
     page: str | None  # what a browser opens; None: it is a window
 
-    def is_open(self) -> bool:
-        """Tell whether nobody has closed it."""
-        return self.process.poll() is None
-
     def wait(self) -> int:
         """Wait until it is closed; return 1 if it failed, 0 after Ctrl-C."""
         try:

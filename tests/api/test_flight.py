@@ -3,6 +3,8 @@
 tests/faults/test_fit.py compares estimates with peaks.
 """
 
+import math
+
 import pytest
 
 from swarm_mj.api import flight
@@ -60,3 +62,29 @@ def test_a_long_flight_of_many_takes_what_nobody_has():
     assert (bare.memory < 0.3e9, bare.file) == (True, 0.0)
     # torch, and the packets that a learned policy's robots remember
     assert learned.memory - bare.memory > 4 * 1000**3
+
+
+class Clock:
+    """A clock that sleeping moves, and nothing else."""
+
+    now_s = 0.0
+
+    def monotonic(self):
+        return self.now_s
+
+    perf_counter = monotonic
+
+    def sleep(self, how_long_s):
+        self.now_s += how_long_s
+
+
+@pytest.mark.parametrize(("speed", "flown_s"), [(math.inf, 0.0), (1.0, 0.6), (2.0, 0.3)])
+def test_a_flight_takes_its_own_time_by_its_speed(monkeypatch, speed, flown_s):
+    clock = Clock()
+    monkeypatch.setattr(flight, "time", clock)
+    mission = paper("random-walk", num_robots=4, num_windows=6)
+    policy = make_policy("tdma", mission)
+    slow = flight.Flight(mission=mission, policy=policy, policy_name="tdma", seed=3, speed=speed)
+    flown = flight.fly_mission(slow, console=quiet_console(), way_on=None)
+    assert clock.now_s == pytest.approx(flown_s)
+    assert len(flown.run.windows) == 6

@@ -4,7 +4,9 @@ import json
 import re
 import shlex
 import signal
+from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -15,8 +17,8 @@ from swarm_mj.cli import fly, main, parse
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.tuning import tuned_probability
-from swarm_mj.replay import write
-from swarm_mj.replay.read import check_replay, windows
+from swarm_mj.replay import view, write
+from swarm_mj.replay.read import check_replay, read_footage, windows
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
 
@@ -238,3 +240,69 @@ def test_a_file_that_fails_takes_nothing_else_with_it(tmp_path, monkeypatch, cap
     said = capsys.readouterr()
     assert "flocking, planner, 6 robots" in said.out
     assert said.err == f"swarm-mj: error: {lost} could not be written: No space left on device\n"
+
+
+@pytest.fixture
+def nowhere(monkeypatch):
+    """A viewer that takes no data, and is closed after the flight."""
+
+    @contextmanager
+    def viewer(_where):
+        process = SimpleNamespace(wait=lambda: 0)
+        yield view.LiveViewer(process=process, address="rerun+http://127.0.0.1:9/proxy", page="")
+
+    monkeypatch.setattr(view, "live_viewer", viewer)
+    monkeypatch.setattr("rerun.RecordingStream.connect_grpc", lambda *_: None)
+
+
+@pytest.mark.usefixtures("nowhere")
+def test_a_live_flight_leaves_what_others_do(here, capsys):
+    windows_flown = ("--windows", "60", "--robots", "6", "--policy", "tdma")
+    assert main(["fly", *windows_flown, "--live", "web", "--record", "live.rrd"]) == 0
+    assert "Open the replay" in capsys.readouterr().out
+    assert main(["fly", *windows_flown, "--record", "plain.rrd"]) == 0
+    found, expected = (read_footage(here / f"{name}.rrd") for name in ("live", "plain"))
+    assert found.facts == expected.facts
+    np.testing.assert_array_equal(found.position_m, expected.position_m)
+    np.testing.assert_array_equal(found.known_age, expected.known_age)
+
+
+@pytest.mark.usefixtures("nowhere")
+def test_ctrl_c_keeps_what_a_live_flight_has_shown(here, monkeypatch, capsys):
+    def some(swarm, *policy):
+        for number, window in enumerate(rollout(swarm, *policy), start=1):
+            if number == 40:
+                signal.raise_signal(signal.SIGINT)
+            yield window
+
+    monkeypatch.setattr(flight, "rollout", some)
+    assert main(["fly", "--robots", "6", "--live", "web", "--record", "a.rrd"]) == 130
+    assert "Interrupted after 40 of 500 windows." in capsys.readouterr().err
+    assert len(windows(here / "a.rrd")) == 40
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--live",), "there is no display .*; --live web"),
+        (("--live", "tv"), "live must be one of window, web, not 'tv'"),
+        (("--speed", "2"), "--speed 2 is of live flights; add --live"),
+        (("--live", "web", "--speed", "fast"), "--speed"),
+    ],
+)
+def test_what_cannot_be_shown_live_is_one_line(here, monkeypatch, capsys, options, message):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    assert status("fly", *SHORT, *options) == 2
+    said = capsys.readouterr().err
+    assert re.search(message, said)
+    assert said.count("\n") == 1
+    assert not list(here.iterdir())
+
+
+def status(*line):
+    """A command's exit code, also if its line could not be read."""
+    try:
+        return main(list(line))
+    except SystemExit as ended:
+        return ended.code

@@ -157,5 +157,5 @@ def test_the_server_of_a_live_flight_takes_data_and_ends_with_the_block():
         assert viewer.address.split("/proxy")[0].split("//")[1] in viewer.page.replace(
             "%3A", ":"
         ).replace("%2F", "/")
-        assert viewer.is_open()
-    assert not viewer.is_open()
+        assert viewer.process.poll() is None
+    assert viewer.process.poll() is not None
