@@ -23,7 +23,7 @@ from results_rows import Row, Rows, origin, read, select
 
 from swarm_mj.cli import script
 from swarm_mj.cli.policies import facts_of
-from swarm_mj.evaluation.results import CARRIES_MORE
+from swarm_mj.evaluation.results import LARGER_PACKETS
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.system.exit_codes import DONE, FAILED
@@ -153,7 +153,7 @@ def _name(row: dict[str, Any], used: Rows) -> str:
     more = any(each.get("payload") not in (None, "none") for each in its)
     policy = str(row["policy"])
     name = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else NAMES.get(policy, policy)
-    return f"{name} (packets {CARRIES_MORE})" if more else name
+    return f"{name} ({LARGER_PACKETS})" if more else name
 
 
 def value(words: str, folder: Path) -> str:

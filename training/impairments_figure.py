@@ -135,7 +135,7 @@ def draw(found: Sequence[Result]) -> Figure:
                 axes.text(
                     column, row, f"{value:.2f}", ha="center", va="center", fontsize=6, color=ink
                 )
-        figure.suptitle("Ages over those without the impairment", x=0.01, ha="left")
+        figure.suptitle("Age relative to no impairment (1 = unaffected)", x=0.01, ha="left")
         first = found[0]
         said = (
             f"{first.num_robots} robots, {first.num_windows} windows, {first.episodes} missions "

@@ -15,7 +15,13 @@ from matplotlib.ticker import LogLocator
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures import style
 from swarm_mj.evaluation.figures.style import look_of
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, is_flock, statistics_of
+from swarm_mj.evaluation.results import (
+    LARGER_PACKETS,
+    Result,
+    carries_more,
+    is_flock,
+    statistics_of,
+)
 from swarm_mj.evaluation.table import missions_title
 from swarm_mj.protocol.agreement import AGREED
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
@@ -158,7 +164,7 @@ def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:
 
 
 def _name_of(result: Result) -> str:
-    """Return a policy's name, marked where its packets carry more than T, M and P."""
+    """Return a policy's name, marked where its packets are larger."""
     label = look_of(result.policy).label
     return f"{label} +" if carries_more(result) else label
 
@@ -170,7 +176,7 @@ def _origin(results: Sequence[Result]) -> str:
     if first.aoi_ci_low is not None:
         said += ", and its 95 % interval"
     if any(map(carries_more, results)):
-        said += f"; +: packets {CARRIES_MORE}"
+        said += f"; +: {LARGER_PACKETS}"
     return f"{said}; {style.code(first.version, first.commit)}"
 
 

@@ -58,7 +58,7 @@ def check_convergence(
         is_deterministic: As in `evaluate`.
         channel: Who decodes whom, by `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
-        scene: A function that adds obstacles to the arena, likewise; none unless given.
+        scene: A function that edits the MuJoCo model, likewise; none unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
         num_jobs: Processes, as in `evaluate`.
         **mission_fields: Any field of `Mission`, in its unit, such as `num_robots=20`.

@@ -172,13 +172,13 @@ def evaluate(
         task: The robots' task by name, or a `Mission`. None is as in `fly`.
         num_missions: Of each policy.
         seed: Of the first mission; the others follow one by one.
-        baseline: The policy that the others are compared to, mission by mission; the first unless
+        baseline: The policy that others are compared with, mission by mission; the first unless
             given.
-        probability: Of a transmission, for the policies that have one; tuned unless given.
+        probability: The transmission probability of random policies; tuned unless given.
         is_deterministic: Whether learned policies take their most probable recipient, not a draw.
         channel: Who decodes whom, by `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
-        scene: A function that adds obstacles to the arena, likewise; none unless given.
+        scene: A function that edits the MuJoCo model, likewise; none unless given.
         features: Names of your own feature extractors that learned policies were trained with.
         networks: Names of your own networks that they decide by.
         num_jobs: Processes. With more than one, a script must guard what it runs by

@@ -16,7 +16,7 @@ from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second, where_flown
 from swarm_mj.simulation.rollout import Summary
 
-CENTRE = "a centre that knows all positions"
+CENTRE = "no: a centre knows all positions"
 FATES = {  # rows of the table: a count among the numbers, and its share of the packets sent
     "  heard by at least one robot": "packets_heard",
     "  delivered": "packets_delivered",
@@ -82,10 +82,10 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
         shown_how = f"never; {summary.heard_share:.0%} of pairs at the end"
     else:
         shown_how = f"after {_windows(complete, mission, 0)}"
-    rows["everyone had heard of everyone"] = shown_how
+    rows["all pairs first informed"] = shown_how
 
     hops = summary.hops_mean
-    rows["radio hops that news travelled, mean"] = f"{hops:.2f}" if hops else "-"
+    rows["hops, mean"] = f"{hops:.2f}" if hops else "-"
     rows |= _packets(summary)
 
     carried = "the sender's buffer"
@@ -94,7 +94,7 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     rows["packets carry"] = carried
     rate = bits_per_second(BITS_PER_BYTE * summary.bytes_per_second)
     rows["  bytes each; sent by the team"] = f"{summary.packet_bytes:,}; {rate}"
-    rows["who decides"] = CENTRE if summary.is_centralised else "each robot by itself"
+    rows["decentralised"] = CENTRE if summary.is_centralised else "yes"
     rows |= _task_costs(mission, summary)
     if mission.num_failures:
         rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"

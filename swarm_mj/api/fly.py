@@ -55,7 +55,7 @@ def fly(
         policy: Who transmits when: a name of `POLICIES`, the folder of a learned one, an object, or
             `module:Name` of your own.
         seed: The same seed is the same mission.
-        probability: Of a transmission, for the named policies that have one; tuned unless given.
+        probability: The transmission probability of random policies; tuned unless given.
         is_deterministic: Whether a learned policy takes its most probable recipient, not a draw.
         record: Whether to keep the data of replays and videos, which takes memory.
         observer: The robot whose knowledge the replay shows, from 0.
@@ -64,7 +64,7 @@ def fly(
         speed: Of a live flight, by the mission's own time: 1 is real time, None as fast as it goes.
         channel: Who decodes whom, as an object or `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
-        scene: A function that adds obstacles to the arena, likewise; none unless given.
+        scene: A function that edits the MuJoCo model, likewise; none unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
         networks: Names of your own networks that it decides by.
         **mission_fields: Any field of `Mission`, in its unit, such as `num_robots=20` or

@@ -26,7 +26,7 @@ WRONG_NAMES = (FileNotFoundError, IsADirectoryError, NotADirectoryError, Permiss
 COMMANDS: dict[str, str] = {
     "fly": "Fly one mission and record its replay.",
     "policies": "List the communication policies: what each knows and sends.",
-    "evaluate": "Fly policies over the same missions and say where they stand.",
+    "evaluate": "Compare policies on the same missions.",
     "check": "Check that flocks converge in time; the exit code says whether they do.",
     "study": "Fly a study that is a file, or compare two results.",
     "train": "Train a communication policy by PPO.",

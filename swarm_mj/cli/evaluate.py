@@ -49,7 +49,7 @@ class StudyFlags(EngineOptions):
         None, "write all figures and each mission's costs", metavar="FILE.json"
     )
     csv: Path | None = common_output(
-        None, "write all figures, one row a result", metavar="FILE.csv"
+        None, "write all figures, one row per policy and mission type", metavar="FILE.csv"
     )
     parquet: Path | None = output_option(
         None, "write each mission's costs, one row a mission", metavar="FILE.parquet"
@@ -240,5 +240,5 @@ def _progress_file(options: StudyFlags, outputs: Iterable[Output]) -> Path | Non
     check_outputs(Output("progress", kept), *outputs)  # also against a link to the progress
     if kept.exists() and not (options.resume or options.force):
         ways = "continue it with --resume, or start over with --force"
-        raise ValueError(f"progress {kept} of an interrupted run exists; {ways}")
+        raise ValueError(f"progress {kept} of a run that failed or was stopped exists; {ways}")
     return kept

@@ -50,7 +50,11 @@ class FlyOptions(PolicyOptions):
     seed: int = common_setting(1, "the same seed is the same mission")
     mission: Mission = one_mission()
     record: Path | None = common_output(
-        None, "the replay", metavar="FILE.rrd", shown=f"a fresh name under {REPLAYS}/"
+        None,
+        "the replay",
+        metavar="FILE.rrd",
+        shown=f"a fresh name under {REPLAYS}/",
+        sought_as=("--out",),
     )
     no_record: bool = common_output(False, "record no replay")
     json: Path | None = common_output(None, "write a summary")

@@ -19,7 +19,7 @@ from swarm_mj.system.fields import Meaning, as_typed, kind_of, meaning_of, setti
 from swarm_mj.system.user_code import files_named
 
 NAMED = ", ".join(name for name in POLICIES if name != WITHOUT_PAYLOAD)  # `--payload` makes it
-NAMES = f"who talks when (`swarm-mj policies` says more): {NAMED}"
+NAMES = f"which robots transmit in each window (`swarm-mj policies` says more): {NAMED}"
 OTHERS = "directories or .safetensors files of learned policies, or module:Name of your own"
 SPECS = [spec for spec in fields(Mission) if meaning_of(spec).help]
 FLAGS = {spec.name: flags_of(spec)[0] for spec in SPECS}
@@ -34,7 +34,7 @@ class PolicyOptions(Components):
 
     probability: float | None = setting(
         None,
-        "of a transmission, for policies that have one",
+        "transmission probability of random policies",
         low=0.0,
         high=1.0,
         shown="tuned for the regime",
@@ -53,7 +53,7 @@ class PolicyOptions(Components):
     )
     features: tuple[str, ...] = setting(
         (),
-        "that a learned policy was trained on; give them again",
+        "own features of a trained policy (its file holds only the name)",
         group=GROUP,
         metavar=SHOWN_AS,
         reads=files_named,

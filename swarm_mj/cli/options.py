@@ -28,6 +28,7 @@ Value = TypeVar("Value")
 Given = dict[str, Any]
 
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
+LEAST = 1e-9  # the beginning of a range that 0 alone does not belong to
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
 output_option = partial(settings.setting, group="output")  # under this heading of the help
 common_output = partial(output_option, is_common=True)
@@ -38,6 +39,7 @@ class Parser(argparse.ArgumentParser):
     """A parser that complains in one line, and whose help may leave out what few people need."""
 
     rare: Mapping[argparse.Action, str | None] = MappingProxyType({})  # what `--help-all` says
+    sought: Mapping[str, str] = MappingProxyType({})  # flags that exist, by what is typed for them
 
     def format_help(self) -> str:
         """Return the help; its last line says how to see the options that it leaves out."""
@@ -63,7 +65,9 @@ class Parser(argparse.ArgumentParser):
             flags: list[str] = []
             for action in self._actions:
                 flags.extend(action.option_strings)
-            hint = did_you_mean(left[0].partition("=")[0], flags)
+            typed = left[0].partition("=")[0]
+            meant = self.sought.get(typed)
+            hint = f"; did you mean {meant}?" if meant else did_you_mean(typed, flags)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
 
@@ -208,6 +212,9 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         if heading not in groups:
             groups[heading] = parser.add_argument_group(heading)
         _add(groups[heading], option)
+    parser.sought = {
+        typed: flags_of(option.spec)[0] for option in options for typed in option.about.sought_as
+    }
     parser.rare = {action: action.help for action in parser._actions if action.dest in rare}
     for action in parser.rare:
         action.help = argparse.SUPPRESS
@@ -285,7 +292,12 @@ def _help(option: Option) -> str:
         text += f": {', '.join(about.choices)}"
     if about.high is not None:
         has_end = about.high < MANY
-        text += f", {settings.range_of(spec)}" if has_end else f", {about.low} or more"
+        if has_end:
+            text += f", {settings.range_of(spec)}"
+        elif about.low == LEAST:
+            text += ", more than 0"
+        else:
+            text += f", {about.low} or more"
     default = about.shown
     if default is None:
         has_default = not any(spec.default is each for each in (MISSING, None, False, ()))

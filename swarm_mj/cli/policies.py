@@ -1,4 +1,4 @@
-"""`swarm-mj policies`: who talks when, a line each; of one policy what it knows and sends."""
+"""`swarm-mj policies`: policies, a line each; of one, what it knows and sends."""
 
 import inspect
 import json
@@ -141,7 +141,7 @@ def carried(policy: Policy) -> str:
 
 def _print_one(each: dict[str, Any], policy: Policy, mission: Mission) -> None:
     rows = {
-        "who decides": "a centre" if each["is_centralised"] else "each robot by itself",
+        "decentralised": "no" if each["is_centralised"] else "yes",
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         **_beyond_paper(each),
         "in a window": WINDOWS[each["window"]],

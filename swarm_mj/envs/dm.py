@@ -43,8 +43,8 @@ def make_environment(
         seed: Of the first mission, an integer of 0 or more; the next one has `seed + 1`, and so on.
         channel: As of `Swarm`: who decodes whom; None is the mission's own.
         controller: As of `Swarm`: what drives the robots; None is the task's own.
-        scene: As of `Swarm`: a function that adds obstacles; None adds none but those of the
-            mission's arena.
+        scene: As of `Swarm`: a function that edits the MuJoCo model; None leaves the mission's
+            arena as it is.
 
     Returns:
         The environment. An action is the recipient of each robot, [N] integers from 0 to N - 1,

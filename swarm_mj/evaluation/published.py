@@ -154,7 +154,7 @@ TRANSMIT_POWER = ResultFigure(
     title="Transmit power",
     task="stationary",
     x_name="range_ratio",
-    x_label="range ratio: how far a packet reaches in silence [km]",
+    x_label="range ratio: range with no interference [km]",
     x_scale="log",
     irrelevant=("velocity_ratio",),
     panels=(Panel(cost=AOI),),

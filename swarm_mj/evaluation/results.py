@@ -18,7 +18,7 @@ from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, M
 from swarm_mj.radio.words import radio_in_words
 from swarm_mj.system.reading import read_json
 
-CARRIES_MORE = "carry more than T, M, P"  # said wherever such policies are shown
+LARGER_PACKETS = "larger packets"  # said wherever such policies are shown
 
 
 @dataclass(frozen=True, kw_only=True)

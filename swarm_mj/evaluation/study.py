@@ -31,14 +31,15 @@ class Study:
     Args:
         policies: Names among `POLICIES`, `module:Name` of a user's own, or folders of learned ones.
         regimes: The missions' numbers; a regime is flown from each seed.
-        episodes: Missions of each policy in each regime.
+        episodes: Missions per policy, in each regime.
         seed: Of the first mission; the others follow one by one.
-        probability: Of a transmission, for the policies that have one; None is each policy's own.
+        probability: The transmission probability of random policies; None is each policy's own.
         is_deterministic: Whether learned policies take the most probable recipient.
         features: Users' own extractors that learned policies may load.
         networks: Users' own networks, likewise.
         components: Channel, controller and scene, where they are not the mission's own.
-        baseline: Whom the others are compared to, mission by mission; None is the first policy.
+        baseline: The policy that others are compared with, mission by mission; None is the
+            first policy.
 
     Raises:
         ValueError: There is nothing to evaluate, a policy is unknown, or a number out of range.
@@ -47,7 +48,7 @@ class Study:
     # Names among `POLICIES`, or directories of learned ones.
     policies: tuple[str, ...] = setting(reads=registry.files_of)
     regimes: tuple[Mission, ...]
-    episodes: int = common_setting(100, "missions of each policy in each regime", low=1, high=10**5)
+    episodes: int = common_setting(100, "missions per policy", low=1, high=10**5)
     seed: int = common_setting(1000, "seed of the first mission; the others follow one by one")
     probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
     is_deterministic: bool = False  # whether learned policies take the most probable recipient
@@ -57,7 +58,7 @@ class Study:
     components: Components = setting(Components(), former=("parts",))
     baseline: str | None = common_setting(
         None,
-        "whom the others are compared to, mission by mission",
+        "the policy that others are compared with",
         metavar="POLICY",
         shown="the first policy",
     )
@@ -101,7 +102,7 @@ class Study:
         if number > MAX_MISSIONS:
             raise ValueError(
                 f"a study may have up to {MAX_MISSIONS} missions, not {number} ({self.episodes} "
-                f"episodes x {num_regimes} regimes x {len(self.policies)} policies); choose fewer"
+                f"missions x {num_regimes} regimes x {len(self.policies)} policies); choose fewer"
             )
 
     @property

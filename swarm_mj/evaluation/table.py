@@ -9,7 +9,13 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of, has_memory
+from swarm_mj.evaluation.results import (
+    LARGER_PACKETS,
+    Result,
+    carries_more,
+    config_of,
+    has_memory,
+)
 from swarm_mj.evaluation.table_columns import BRIEF, NONE, WIDE, Shown, number, said
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.presets import paper
@@ -175,6 +181,6 @@ def _legend(results: Sequence[Result], columns: Sequence[Shown]) -> Iterator[str
             "Lower bound: the AoI if all robots with a path between them shared everything at once."
         )
     if any(map(carries_more, results)):
-        yield f"+: packets {CARRIES_MORE}, which the paper's carry."
+        yield f"+: {LARGER_PACKETS} than the paper's."
     if any(map(has_memory, results)):
         yield "+ memory: robots also decide by earlier windows, which the paper's do not."

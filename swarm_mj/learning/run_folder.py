@@ -62,7 +62,7 @@ class Limits:
         None,
         "stop after this many minutes, evaluations and earlier sessions included",
         low=1e-9,
-        high=1e6,
+        high=1e9,
     )
     replay_every: int | None = setting(
         None,

@@ -203,7 +203,7 @@ class Training:
     # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
     silence_logit: float = setting(
         7.0,
-        "added to the logit of silence, except in a robot's own turn",
+        "bias towards silence, outside a robot's turn",
         shown=f"7, features without turns: {TURNLESS_SILENCE:g}, team: the preset's own",
         low=-100.0,
         high=100.0,

@@ -16,7 +16,7 @@ class Dynamics:
 
     physics: PhysicsMode = setting(
         "exact",
-        "the paper's, or forces, as obstacles need",
+        "exact: point masses by Eq. 15; contact: forces and collisions",
         label="physics",
         source="IV-A",
         choices=get_args(PhysicsMode),
@@ -29,7 +29,7 @@ class Dynamics:
     )
     boundary: Boundary = setting(
         "reflect",
-        "at the area's edge; reflect among obstacles",
+        "what happens at the edge; obstacles need reflect",
         label="boundary",
         source="IV-A",
         choices=get_args(Boundary),

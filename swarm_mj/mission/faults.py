@@ -25,7 +25,7 @@ class Faults(Team):
     )
     position_noise_s: float = setting(
         10.0,
-        "its correlation time; it stays as it is while a robot stands",
+        "correlation time of position noise",
         label="position noise time",
         unit="s",
         low=0.0,

@@ -17,7 +17,6 @@ class Impairments(Team):
         0.0,
         "share of packets lost at each receiver",
         label="erasure probability",
-        unit="1",
         low=0.0,
         high=0.99,
         source=NEW,
@@ -25,7 +24,7 @@ class Impairments(Team):
     )
     burst_begin: float = setting(
         0.0,
-        "probability that a receiver goes deaf",
+        "probability that a receiver stops receiving",
         label="burst begin",
         unit="per slot",
         low=0.0,
@@ -35,7 +34,7 @@ class Impairments(Team):
     )
     burst_end: float = setting(
         0.05,
-        "probability that it hears again",
+        "probability that it receives again",
         label="burst end",
         unit="per slot",
         low=0.001,
@@ -48,7 +47,7 @@ class Impairments(Team):
     # Robots with more transmit power.
     high_power_fraction: float = setting(
         0.0,
-        "robots with more transmit power",
+        "robots with extra transmit power",
         label="high-power fraction",
         unit="of the team",
         low=0.0,
@@ -59,7 +58,7 @@ class Impairments(Team):
     )
     high_power_db: float = setting(
         6.0,
-        "how much more that is",
+        "extra transmit power",
         label="extra power",
         unit="dB",
         low=0.0,

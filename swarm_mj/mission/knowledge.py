@@ -36,7 +36,7 @@ class Knowledge:
     )
     map_offset_m: float = setting(
         0.0,
-        "how far east robots' map is of the truth",
+        "error of the robots' map, to the east",
         label="map offset",
         unit="m",
         low=0.0,

@@ -58,9 +58,9 @@ class Team:
     )
     range_ratio: float = setting(
         0.25,
-        "range of a packet in silence",
+        "range with no interference",
         label="range ratio",
-        unit="of 1 km",
+        unit="km",
         low=0.01,
         high=10.0,
         source="IV-B",
@@ -70,7 +70,7 @@ class Team:
     # How robots move (IV-A).
     velocity_ratio: float = setting(
         0.15,
-        "per axis; 0.15 is 3 m/s",
+        "largest speed per axis; 0.15 is 3 m/s",
         label="velocity ratio",
         unit="of 1 km in 50 s",
         low=0.001,

@@ -25,7 +25,7 @@ class Transceiver:
     )
     noise_dbm: float = setting(
         -50.0,
-        "transmit power follows it",
+        "noise power; transmit power changes with it, so the range stays",
         label="noise power",
         unit="dBm",
         low=-200.0,

@@ -13,6 +13,7 @@ from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.obstacles import OBSTACLE_GROUP
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
+from swarm_mj.system.arguments import name_of
 from swarm_mj.system.packages import asset
 
 
@@ -98,6 +99,8 @@ MOVING = (
     "density",
     "viscosity",
 )
+# What a scene must leave of the sphere that stands for a robot; `_check_free` sees to its mass.
+HULL = ("type", "size", "pos", "quat", "fromto", "contype", "conaffinity", "margin", "gap")
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 
@@ -180,20 +183,14 @@ def _rename(element: ElementTree.Element, i: int) -> None:
 
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
     """Let a scene change the arena, but neither the robots' joints nor how MuJoCo steps."""
+    parts = _moving_parts(spec)
     before = _motion(spec)
+    hulls = _hulls(spec, mission)
     flags = spec.option.disableflags
     scene(spec, mission)
-    after = _motion(spec)
-    if list(after) != list(before):
-        raise ValueError(
-            "a scene may add bodies, geoms and sites, but no joints or actuators, and must leave "
-            "the robots' own"
-        )
-    for name, value in after.items():
-        if value != before[name]:
-            raise ValueError(
-                f"a scene must leave how robots move, but changed {name}; add geoms instead"
-            )
+    _check_parts(scene, parts, _moving_parts(spec))
+    _check_unchanged("how robots move", before, _motion(spec))
+    _check_unchanged("the robots' hulls", hulls, _hulls(spec, mission))
     spec.option.timestep = timestep_s(mission)
     spec.option.disableflags = flags
     if mission.physics == "exact":
@@ -205,6 +202,45 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
     for geom in spec.geoms:
         if geom.group == OBSTACLE_GROUP:
             _bounce(geom, mission, priority=1)  # its own contact parameters count
+
+
+def _check_parts(scene: Scene, before: list[str], after: list[str]) -> None:
+    """Raise ValueError if a scene added, took away or renamed what moves or is moved."""
+    name = name_of(scene)
+    for part in after:
+        if part not in before:
+            raise ValueError(f"scene {name} adds {part}; scenes may add only static geometry")
+    for part in before:
+        if part not in after:
+            raise ValueError(
+                f"scene {name} removes or renames {part}; robots must keep joints and actuators"
+            )
+
+
+def _check_unchanged(what: str, before: dict[str, str], after: dict[str, str]) -> None:
+    """Raise ValueError if one of the numbers that a scene must leave is another now."""
+    for name, value in after.items():
+        if value != before.get(name):
+            raise ValueError(f"a scene must leave {what}, but changed {name}; add geoms instead")
+
+
+def _moving_parts(spec: MjSpec) -> list[str]:
+    """Return what a message calls each joint and actuator; one without a name, by its body."""
+    joints = [
+        f"joint {joint.name}" if joint.name else f"a joint to body {joint.parent.name}"
+        for joint in spec.joints
+    ]
+    return joints + [f"actuator {actuator.name}" for actuator in spec.actuators]
+
+
+def _hulls(spec: MjSpec, mission: Mission) -> dict[str, str]:
+    """Return the shape, place and masks of all robots' hulls, by what they are of."""
+    found: dict[str, str] = {}
+    for i in range(mission.num_robots):
+        hull = _hull(spec, i)
+        for name in HULL:
+            found[f"{name} of {hull.name}"] = str(np.asarray(getattr(hull, name)).tolist())
+    return found
 
 
 def _hull(spec: MjSpec, i: int) -> MjsGeom:

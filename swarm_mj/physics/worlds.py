@@ -46,8 +46,9 @@ class Physics:
             ValueError: The scene changes how robots move, or does not compile.
         """
         self._mission = mission
+        composed = compose(mission, scene=scene)
         try:
-            self._model = compose(mission, scene=scene).compile()
+            self._model = composed.compile()
         except ValueError as error:  # MuJoCo's, in several lines
             if scene is None:
                 raise

@@ -92,7 +92,7 @@ class CarrierSense(RandomTransmission, SensingPolicy):
         uses="the power that it senses in the channel before it transmits",
         beyond=(Information.RADIO_CONSTANTS, Information.CARRIER_SENSING),
         payload=None,
-        look=Look(label="CSMA", colour="#661100", marker=">"),
+        look=Look(label="csma", colour="#661100", marker=">"),
         memory=SENSING_MEMORY,
     )
 
@@ -152,7 +152,7 @@ class AgeGainCsma(SensingPolicy):
             Information.DECODED_PACKETS,
         ),
         payload=None,
-        look=Look(label="age-gain CSMA", colour="#2244ee", marker="8"),
+        look=Look(label="age-gain-csma", colour="#2244ee", marker="8"),
         memory=SENSING_MEMORY,
     )
 

@@ -32,7 +32,7 @@ class RoundRobin(CentralisedPolicy):
         ),
         beyond=(),
         payload=None,
-        look=Look(label="round robin", colour="#56b4e9", marker="s"),
+        look=Look(label="round-robin", colour="#56b4e9", marker="s"),
         memory=FEW_BYTES,
     )
 
@@ -88,7 +88,7 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
         ),
         beyond=(),
         payload=None,
-        look=Look(label="MST", colour="#009e73", marker="^"),
+        look=Look(label="mst", colour="#009e73", marker="^"),
         memory=FEW_BYTES,
     )
 

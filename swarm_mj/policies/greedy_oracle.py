@@ -43,7 +43,7 @@ class GreedyOracle(CentralisedPolicy):
         beyond=(Information.TRUE_POSITIONS, Information.ALL_BUFFERS, Information.TRUE_CHANNEL),
         payload=None,
         look=Look(
-            label="greedy oracle", colour="#000000", marker=".", marker_size=5.0, line_width=0.8
+            label="greedy-oracle", colour="#000000", marker=".", marker_size=5.0, line_width=0.8
         ),
         memory=PairMemory(bytes_per_pair=60.0),
     )

@@ -24,7 +24,7 @@ class GnnShape:
     num_features: int = setting(low=1, high=1024)  # F: numbers per node
     num_outputs: int = setting(1, low=1, high=1024)  # O: numbers per node that come out
     latent: int = setting(64, "width of every layer", low=1, high=1024)
-    depth: int = setting(3, "layers of every MLP, a ReLU after all but the last", low=1, high=8)
+    depth: int = setting(3, "layers of each MLP", low=1, high=8)
     receptive_field: int = setting(
         5, "K: how often the one shared GN block is applied", low=0, high=16
     )

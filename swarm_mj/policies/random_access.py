@@ -67,7 +67,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
         uses="nothing: it transmits with probability p",
         beyond=(),
         payload=None,
-        look=Look(label="random flooding", colour="#e69f00", marker="o"),
+        look=Look(label="random-flooding", colour="#e69f00", marker="o"),
         memory=FEW_BYTES,
     )
 
@@ -127,7 +127,7 @@ class Aloha(RandomTransmission, BroadcastPolicy):
             Information.RADIO_CONSTANTS,
         ),
         payload=None,
-        look=Look(label="slotted ALOHA", colour="#999933", marker="v"),
+        look=Look(label="aloha", colour="#999933", marker="v"),
         memory=FEW_BYTES,
     )
 

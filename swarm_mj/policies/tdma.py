@@ -52,7 +52,7 @@ class Tdma(BroadcastPolicy):
         ),
         beyond=(Information.COMMON_ORDER, Information.CLOCK, Information.TEAM_SIZE),
         payload=None,
-        look=Look(label="TDMA", colour="#0072b2", marker="D", marker_size=4.0),
+        look=Look(label="tdma", colour="#0072b2", marker="D", marker_size=4.0),
         memory=FEW_BYTES,
     )
 
@@ -108,7 +108,7 @@ class SpatialTdma(Tdma):
             Information.PRIOR_KNOWLEDGE,
         ),
         payload=None,
-        look=Look(label="spatial TDMA", colour="#332288", marker="h", marker_size=5.5),
+        look=Look(label="spatial-tdma", colour="#332288", marker="h", marker_size=5.5),
         memory=FEW_BYTES,
     )
 

@@ -107,7 +107,7 @@ def _right(out: RerunLog, *, is_live: bool) -> rrb.Vertical:
     up = (-0.05 * height, 1.05 * height)
     name = f"Tree of r{log.ego}, in hops"
     tree = _drawing("/", name, across, up, contents=layers.TREE.contents)
-    name = "Ages: rows about columns"
+    name = "Age of row's knowledge of column"
     every = in_matrix(log.facts.mission.num_robots).step
     if every > 1:
         name += f", every {every}th robot"

@@ -141,8 +141,10 @@ def _link_plot(log: Log) -> Plot:
         100.0 * log.cut_off_share[window - log.window[0]],
         window=window,
     )
-    named = "believed, too weak (red); works, unbelieved (green); cut off (white)"
-    return Plot(title=f"Share [%]: {named}", view=view, curves=[too_weak, unbelieved, cut_off])
+    named = "predicted but dead (red), alive but not predicted (green); cut off (white)"
+    return Plot(
+        title=f"Link model errors [%]: {named}", view=view, curves=[too_weak, unbelieved, cut_off]
+    )
 
 
 def _cost_plot(cost: TaskCost) -> Plot:

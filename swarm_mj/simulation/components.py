@@ -60,7 +60,13 @@ class Components:
     controller: Any = setting(
         None, "what drives the robots", shown="the task's", reads=_files, **OWN
     )
-    scene: Any = setting(None, "a function that adds obstacles", shown="none", reads=_files, **OWN)
+    scene: Any = setting(
+        None,
+        "a function that edits the MuJoCo model; an MJCF file is an --arena",
+        shown="none",
+        reads=_files,
+        **OWN,
+    )
 
     def __post_init__(self) -> None:
         for kind, component in self.given.items():
@@ -140,4 +146,9 @@ def _made(kind: str, name: str, mission: Mission) -> object:
     if kind == "channel" and name.startswith(TABLE):
         table = partial(GainTable, path=Path(name.removeprefix(TABLE)))
         return call(kind, name, table, mission)
-    return make(kind, name, mission)
+    try:
+        return make(kind, name, mission)
+    except ValueError as error:
+        if kind == "scene" and Path(name).suffix == ".xml":
+            raise ValueError(f"{error}; to use an MJCF file: --arena {name}") from error
+        raise

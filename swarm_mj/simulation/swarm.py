@@ -49,8 +49,8 @@ class Swarm:
         seeds: One integer of 0 or more for each mission.
         channel: Who decodes whom, as an object or `module:Name`; None is the mission's own.
         controller: What drives the robots; None is the task's own.
-        scene: A function that adds obstacles, the same in all missions; None adds none but those
-            of the mission's arena.
+        scene: A function that edits the MuJoCo model, the same in all missions; None leaves the
+            mission's arena as it is.
         num_threads: Threads of MuJoCo, from 1 to 1024.
 
     Attributes:

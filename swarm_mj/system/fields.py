@@ -72,6 +72,7 @@ class Meaning:
     convert: Callable[[str], object] | None = None  # makes the value of what was typed
     reads: Callable[[Any], Iterable[Path]] | None = None  # files to read that a value names
     bare: str | None = None  # its value if the flag is typed without one; None: it needs one
+    sought_as: tuple[str, ...] = ()  # flags typed for it that are none; a message leads here
     is_positional: bool = False  # whether the option has no flag
     is_common: bool = False  # whether `--help` shows it, and does not leave it to `--help-all`
 
@@ -104,6 +105,7 @@ class MeaningFields(TypedDict, total=False):
     convert: Callable[[str], object] | None
     reads: Callable[[Any], Iterable[Path]] | None
     bare: str | None
+    sought_as: tuple[str, ...]
     is_positional: bool
     is_common: bool
 

@@ -21,6 +21,7 @@ from swarm_mj.system.arguments import did_you_mean, unwrapped
 FORM = re.compile(r"[^\W\d]\w*(\.[^\W\d]\w*)*:[^\W\d]\w*")
 ARGUMENT = "mission"  # the name of the one argument that users' code may ask for
 PACKAGE = __name__.partition(".")[0]
+WRONG_ARGUMENTS = "incompatible function arguments"  # begins a message of several lines
 _loaded: dict[str, str] = {}  # modules of users' code, and what a message calls it
 
 
@@ -191,7 +192,7 @@ def _import(kind: str, name: str, module_name: str) -> ModuleType:
 
 def _in_a_line(error: BaseException, module: str) -> str:
     """Return an exception in one line, with the last place in a module that it came through."""
-    text = " ".join(str(error).split())[:300]
+    text = " ".join(_without_signatures(str(error)).split())[:300]
     said = f"{type(error).__name__}: {text}" if text else type(error).__name__
     frames = traceback.walk_tb(error.__traceback__)
     theirs = [each for each in frames if each[0].f_globals.get("__name__") == module]
@@ -199,6 +200,14 @@ def _in_a_line(error: BaseException, module: str) -> str:
         return said
     frame, line = theirs[-1]
     return f"{said} ({os.path.relpath(frame.f_code.co_filename)}, line {line})"
+
+
+def _without_signatures(text: str) -> str:
+    """Return a message of pybind11 without the list of all that it would have taken."""
+    lines = text.strip().splitlines()
+    if WRONG_ARGUMENTS in text and len(lines) > 1:
+        return f"{WRONG_ARGUMENTS}; {lines[-1]}"
+    return text
 
 
 def _parameters(found: Callable[..., object]) -> Mapping[str, inspect.Parameter]:

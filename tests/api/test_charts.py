@@ -101,8 +101,8 @@ def test_a_chart_says_the_whole_mission_and_of_two_each_its_own():
         assert "20 windows of exact physics, 2 missions from seed 1000" in said.replace("\n", " ")
     assert other.replace("\n", " ").endswith(r", channel my\$:Radio, scene my:walls, arena rooms")
     labels = [axes.get_yticklabels()[0].get_text() for axes in figure.axes]
-    assert labels == ["TDMA", "TDMA +"]
-    assert "95 % interval; +: packets carry more than T, M, P; " in figure.get_supxlabel()
+    assert labels == ["tdma", "tdma +"]
+    assert "95 % interval; +: larger packets; " in figure.get_supxlabel()
 
 
 def test_one_mission_has_no_interval_and_flocks_have_velocities():

@@ -58,7 +58,7 @@ ROWS = [  # policy, task, numbers, and the rows that they make
             "heard by at least one robot": "150 (75%)",
             "robots that heard a packet, mean": "2.50",
             "age of information, mean": "12.50 windows (1.2 s)",
-            "everyone had heard of everyone": "after 70 windows (7 s)",
+            "all pairs first informed": "after 70 windows (7 s)",
             "flock agreed: under 1% is left": "from window 36 on (3.6 s)",
             "falls at first by": "10% a window (19% if all knew all)",
         },
@@ -81,26 +81,26 @@ ROWS = [  # policy, task, numbers, and the rows that they make
             "packets broadcast": "0 (0.0 a window)",
             "heard by at least one robot": "0",
             "robots that heard a packet, mean": "-",
-            "everyone had heard of everyone": "never; 25% of pairs at the end",
+            "all pairs first informed": "never; 25% of pairs at the end",
             "flock agreed: under 1% is left": "no, 25.0%",
         },
     ),
     (
         *("tdma", "flocking", BROADCAST | {"complete_window": 1.0, "agreed_window": 100.0}),
         {
-            "everyone had heard of everyone": "after 1 window (0.1 s)",
+            "all pairs first informed": "after 1 window (0.1 s)",
             "flock agreed: under 1% is left": "from window 100 on (10 s)",
         },
     ),
     (*("tdma", "random-walk", BROADCAST), {"first to last window": "4.0000 to 0.0020 m²/s²"}),
     (
         *("planner", "stationary", BROADCAST),
-        {"packets carry": "the sender's buffer and links", "who decides": "each robot by itself"},
+        {"packets carry": "the sender's buffer and links", "decentralised": "yes"},
     ),
     (*(WITHOUT_PAYLOAD, "stationary", BROADCAST), {"packets carry": "the sender's buffer"}),
     (
         *("round-robin", "stationary", BROADCAST),
-        {"who decides": "a centre that knows all positions"},
+        {"decentralised": "no: a centre knows all positions"},
     ),
 ]
 

@@ -69,7 +69,7 @@ def test_a_summary_is_what_the_library_computes(succeed, tmp_path):
 
 REFUSED = {
     "--robots 1": "a whole number from 2 to 10000 [robots], not 1",
-    "--range-ratio 0": "range ratio must be a number from 0.01 to 10 [of 1 km], not 0",
+    "--range-ratio 0": "range ratio must be a number from 0.01 to 10 [km], not 0",
     "--policy magic": "policy must be one of random-flooding, round-robin, mst",
     "--policy round-robin --probability 0.1": "takes no transmission probability",
     "--seed -1": "not [-1]",

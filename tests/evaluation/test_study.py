@@ -72,7 +72,7 @@ def test_the_last_seed_is_allowed():
 def test_more_missions_than_can_be_listed_are_refused():
     """Before policies are made for them."""
     regimes = tuple(paper(num_robots=n) for n in range(2, 1003))
-    rule = r"up to 10000000 missions, not 100100000 \(100000 episodes x 1001 regimes x 1 policies\)"
+    rule = r"up to 10000000 missions, not 100100000 \(100000 missions x 1001 regimes x 1 policies\)"
     with pytest.raises(ValueError, match=rule):
         Study(policies=("tdma",), regimes=regimes, episodes=100_000)
 

@@ -178,7 +178,7 @@ def test_payloads_beyond_the_papers_are_marked_and_explained(printed, option, pa
     above, below = rows(lines, "planner")
     assert (above[:2], below[: len(mark)]) == (["planner", "1.00"], mark)
     text = " ".join(" ".join(lines).split())
-    assert ("+: packets carry more than T, M, P" in text) == (payload == "snapshots")
+    assert ("+: larger packets" in text) == (payload == "snapshots")
 
 
 def test_what_packets_weigh_and_what_teams_send(printed):

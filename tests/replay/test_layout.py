@@ -22,7 +22,7 @@ EVERYWHERE = {
     "Map, squares of 100 m",
     "Legend",
     "Tree of r4, in hops",
-    "Ages: rows about columns",
+    "Age of row's knowledge of column",
     "Age of information [windows]: team ± std (green), r4 (white)",
     "Scene in 3-D, colours as on the map",
     "About this mission",
@@ -32,7 +32,10 @@ OF_BROADCASTS = "Packets in 10 windows: sent (grey), heard by anyone (blue)"
 RADIO = "Radio of every robot: delivers (green), is lost (orange), answers (blue), overhears (pink)"
 RADIO_OF_BROADCASTS = "Radio of every robot: transmits (blue), hears (dark)"
 OF_FLOCKS = "Velocity variance [m²/s²]; a line: the flock has agreed"
-OF_WORLDS = "Share [%]: believed, too weak (red); works, unbelieved (green); cut off (white)"
+OF_WORLDS = (
+    "Link model errors [%]: predicted but dead (red), alive but not predicted (green); "
+    "cut off (white)"
+)
 
 FLIGHTS = {  # by replay: the flight, its legend's texts and the plots beyond those of all
     "replay": ("two_way", ADDRESSED | ALWAYS | MOVING, {OF_ADDRESSED, OF_FLOCKS, RADIO}),

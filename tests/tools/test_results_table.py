@@ -130,7 +130,7 @@ def test_names_say_what_packets_carry_and_what_is_no_policy(made):
     ]
     shown = cells(table(BY_RANGE, made(rows)))
     assert [line.split(" | ")[0] for line in shown] == [
-        "| `planner` (packets carry more than T, M, P)",
+        "| `planner` (larger packets)",
         "| `planner --payload none`",
         "| searched schedule (a ceiling, [no policy for a team](bounds.md))",
         "| mine.py:Mine",

@@ -39,7 +39,7 @@ def test_the_floor_is_named_under_the_policies_and_its_commit_stands_below(floor
     searched = replace(rows[0], policy="training.ceiling:Annealed", episodes=3)  # fewer
     figure = draw_limits(rows, [searched], *read_floor(floor))
     texts = {text.get_text() for text in figure.findobj(lambda a: hasattr(a, "get_text"))}
-    assert {"TDMA", "proven floor", "searched schedule"} <= texts
+    assert {"tdma", "proven floor", "searched schedule"} <= texts
     assert any("abcdef0" in text for text in texts)
 
 

@@ -13,10 +13,10 @@ RESULTS = ROOT / "training" / "results" / "paper-random-walk.csv"
 LABELS = {
     "planner": "planner +",
     "sotdma": "sotdma",
-    "age-gain-csma": "age-gain CSMA",
-    "gnn": "gnn (T, M, P only)",
-    "tdma": "TDMA",
-    "random-flooding": "random flooding",
+    "age-gain-csma": "age-gain-csma",
+    "gnn": "gnn",
+    "tdma": "tdma",
+    "random-flooding": "random-flooding",
 }
 PAPERS = "the paper's GNN, published"
 

@@ -22,7 +22,7 @@ from swarm_mj.evaluation.figures.curves import (
 )
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, look_of, styled, write_caption
 from swarm_mj.evaluation.published import MissionField, Panel, ResultFigure
-from swarm_mj.evaluation.results import CARRIES_MORE, Result, carries_more, config_of
+from swarm_mj.evaluation.results import LARGER_PACKETS, Result, carries_more, config_of
 
 # Heights, from the top: the head, each panel, what is between two, and the x axis with the caption.
 TOP_IN = 0.86
@@ -204,7 +204,7 @@ def _head(
     theirs.set(linestyle="--", linewidth=1.2, markerfacecolor="white")
     handles = {"this package, mean ± SEM": ours, "published, mean ± SEM": theirs}
     if any(map(carries_more, results)):
-        handles[f"{MORE}: packets {CARRIES_MORE}"] = Line2D([], [], linestyle="")
+        handles[f"{MORE}: {LARGER_PACKETS}"] = Line2D([], [], linestyle="")
     drawing.legend(
         handles=list(handles.values()),
         labels=list(handles),

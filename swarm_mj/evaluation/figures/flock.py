@@ -7,7 +7,7 @@ from matplotlib.patches import Rectangle
 from matplotlib.quiver import Quiver
 
 from swarm_mj.evaluation.figures.style import FAINT, WIDTH_IN, code, styled, write_caption
-from swarm_mj.evaluation.results import CARRIES_MORE
+from swarm_mj.evaluation.results import LARGER_PACKETS
 from swarm_mj.mission import PAPERS, Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.registry import make_policy
@@ -40,7 +40,7 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     start = swarm.states
     for _ in rollout(swarm, policy):
         pass
-    carries = "" if policy.payload == "none" else f" ({CARRIES_MORE})"
+    carries = "" if policy.payload == "none" else f" ({LARGER_PACKETS})"
     flown = f"{mission.num_robots} robots, policy {policy_name}{carries}, seed {seed}"
     about = f"fig2, preset {preset}: {flown}, {mission.num_windows} windows"
     with styled():

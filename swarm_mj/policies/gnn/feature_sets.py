@@ -131,7 +131,10 @@ def load_features(features: str) -> None:
     if not isinstance(own, type) or not issubclass(own, FeatureExtractor):
         raise ValueError(f"features {features} must be a FeatureExtractor's class, not {own!r:.80}")
     if not getattr(own, "names", ()):
-        raise ValueError(f"features {features} must have names, one for each number of a node")
+        raise ValueError(
+            f"features {features}: class {own.__name__} needs a class attribute names, one string "
+            "per input"
+        )
     _own[features] = own
 
 

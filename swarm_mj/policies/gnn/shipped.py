@@ -23,6 +23,6 @@ SHIPPED_GNN = Listed(
         Information.DECODED_PACKETS,
     ),
     payload=None,
-    look=Look(label="gnn (T, M, P only)", colour="#d55e00", marker="*", marker_size=8.0),
+    look=Look(label="gnn", colour="#d55e00", marker="*", marker_size=8.0),
     memory=FEW_BYTES,  # beside what `simulation.memory` counts for every learned policy
 )

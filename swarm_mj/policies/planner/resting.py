@@ -98,7 +98,7 @@ class RestingPlanner(BroadcastPolicy):
         ),
         beyond=BEYOND,
         payload=None,
-        look=Look(label="planner, no payload", colour="#a6d854", marker="<"),
+        look=Look(label="planner --payload none", colour="#a6d854", marker="<"),
         memory=PLANS_MEMORY,
     )
 
