@@ -178,7 +178,7 @@ def agreed(out: RerunLog) -> int | None:
     if not shows_agreement(out.log):
         return None
     variance = np.concatenate(out.drawn.variance_m2ps2)
-    (since,) = agreed_window(list(variance[:, None]))
+    (since,) = agreed_window(variance[:, None])
     return None if np.isnan(since) else int(since)
 
 

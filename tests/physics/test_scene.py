@@ -167,7 +167,7 @@ def test_a_scene_may_not_add_what_moves():
     def ball(spec, _mission):
         spec.worldbody.add_body(name="ball").add_freejoint(name="rolls")
 
-    with pytest.raises(ValueError, match="adds .*; scenes may add only static geometry"):
+    with pytest.raises(ValueError, match=r"adds .*; scenes may add only static geometry"):
         compose(paper(num_robots=3), scene=ball)
 
 

@@ -123,6 +123,6 @@ def test_a_link_to_nothing_is_an_error():
 def test_a_mission_s_fields_stand_with_units_and_defaults():
     rows = mission_fields().splitlines()
     assert (
-        "| `noise_dbm` | `-50` | noise power; transmit power changes with it, so the range stays | -200 to 50 [dBm] | IV-B |"
-        in rows
+        "| `noise_dbm` | `-50` | noise power; transmit power changes with it, so the range stays | "
+        "-200 to 50 [dBm] | IV-B |" in rows
     )
