@@ -28,7 +28,7 @@ help:
 	@echo "make results fly every table and figure of the docs, at one commit: hours; SCALE=smoke takes minutes"
 	@echo "make figures draw all figures from training/results/"
 	@echo "make reproduce  train the paper's GNNs anew, then fly them; BUDGET=full has the authors' budget"
-	@echo "make video   remake the moving picture (needs OpenGL, or libosmesa6)"
+	@echo "make video   remake the moving pictures (needs OpenGL, or libosmesa6)"
 	@echo "make picture remake the pictures of replays (needs a Vulkan driver)"
 	@echo "make docs    build this documentation as a site; make docs-serve shows it while you write"
 	@echo "make setup   create .venv from pinned wheels; PYTHON=python3.12 chooses another"
@@ -206,7 +206,16 @@ docs: $(DEV)
 docs-serve: $(DEV)
 	$(BIN)/mkdocs serve $(ARGS)
 
+# The film at the top of the README, for dark and for light pages; and the default flight.
+TOUR := --controller training.examples.city_tour:Tour --task random-walk --arena blocks --robots 30 \
+  --range-ratio 0.15 --velocity-ratio 0.8 --windows 600 --force
 video: setup
+	$(BIN)/swarm-mj fly $(TOUR) --policy age-gain-csma --record replays/tour.rrd
+	$(BIN)/swarm-mj fly $(TOUR) --policy random-flooding --record replays/tour-flooding.rrd
+	for theme in dark light; do \
+	  $(BIN)/swarm-mj replay replays/tour.rrd replays/tour-flooding.rrd --theme $$theme --seconds 15 \
+	    --size 830x560 --video assets/pictures/tour-$$theme.gif --force || exit; \
+	done
 	$(BIN)/swarm-mj fly --record replays/planner.rrd --force
 	$(BIN)/swarm-mj fly --policy random-flooding --record replays/random-flooding.rrd --force
 	$(BIN)/swarm-mj replay replays/planner.rrd replays/random-flooding.rrd \

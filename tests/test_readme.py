@@ -27,7 +27,7 @@ REASONS = {
     "needs OpenGL": "video|render",
     "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari",
     "installs packages": "^pip install",
-    "takes minutes": "train",
+    "takes minutes": "train|check",
     "needs SLURM": "slurm",
 }
 LANGUAGES = {"python", "sh", "", "text", "bibtex", "xml", "toml", "diff"}

@@ -26,7 +26,7 @@ PAGES = {  # where they are on the site, and in the repository
     "contributing.md": "CONTRIBUTING.md",
 }
 PLACES = {source: page for page, source in PAGES.items()}
-LINK = re.compile(r"(\]\(|src=\")(?![a-z]+:|#)([^)#\"\s]+)")
+LINK = re.compile(r"(\]\(|src=\"|srcset=\")(?![a-z]+:|#)([^)#\"\s]+)")
 FENCE = re.compile(r"^```.*?^```$", re.MULTILINE | re.DOTALL)
 MAP_LINE = re.compile(
     r"^    ([IV]\S*)\s+((?:Eq|Alg|Fig)\. \d+)?\s+(\S.*?)\s{2,}(\S+)$", re.MULTILINE

@@ -11,6 +11,7 @@ from rich.console import Console
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.replay import view
+from swarm_mj.replay.rendering.theme import THEMES
 from swarm_mj.simulation.components import SHOWN_AS, Components
 from swarm_mj.system.fields import GONE_IN, files_read, setting, the_file
 from swarm_mj.system.interrupt import raise_if_interrupted
@@ -63,6 +64,7 @@ class ReplayOptions:
     fps: int | None = _video(
         None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
     )
+    theme: str = _video("dark", "colours of the frame and the ground", choices=tuple(THEMES))
     scene: str | None = _video(
         None,
         "the scene of your own that the mission was flown in; of a picture, too",
@@ -101,8 +103,9 @@ def _check_together(options: ReplayOptions) -> None:
             named.append(way)
     if len(named) > 1:
         raise ValueError(f"{named[0]} is not allowed with {named[1]}; leave one out")
-    if not options.video and (options.size or options.seconds or options.fps):
-        raise ValueError("--size, --seconds and --fps are of videos; name one by --video")
+    is_styled = options.size or options.seconds or options.fps or options.theme != "dark"
+    if not options.video and is_styled:
+        raise ValueError("--size, --seconds, --fps and --theme are of videos; name one by --video")
     if not options.picture and options.window:
         raise ValueError("--window is of pictures; name one by --picture")
     if not (options.video or options.picture) and (options.force or options.scene):
@@ -175,7 +178,7 @@ def _style(options: ReplayOptions, suffix: str) -> view.VideoStyle:
         style = replace(style, width=width, height=height)
     seconds = options.seconds or style.seconds
     fps = options.fps or style.fps
-    return view.fitted(replace(style, seconds=seconds, fps=fps), suffix)
+    return view.fitted(replace(style, seconds=seconds, fps=fps, theme=options.theme), suffix)
 
 
 def _in_scene(footage: "Footage", scene: str | None) -> "Footage":

@@ -151,6 +151,7 @@ class VideoStyle:
     height: int = 720
     seconds: float = LONGEST_S  # in which the whole mission is shown
     fps: int | float = 25  # pictures per second
+    theme: str = "dark"  # a name of `rendering.theme.THEMES`
 
     @property
     def num_frames(self) -> int:

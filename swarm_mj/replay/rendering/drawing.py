@@ -13,17 +13,19 @@ from swarm_mj.radio.words import where_flown
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import DASHES, WHOLE
-from swarm_mj.replay.palette import Colour, dim
+from swarm_mj.replay.palette import Colour
+from swarm_mj.replay.rendering.theme import DARK, Theme
 
 FAINT = 0.45  # what is still to come, and texts that matter less
 SHADE = 0.35  # of columns behind a curve
 NUM_SHADES = 48
-SHORTFALL = "missing to decode"  # the meaning of the numbers next to robots
+SHORTFALL = "too weak by"  # the meaning of the numbers next to robots
 TAG = 2  # of dark ground around a number [pixels]
 LABELS_FIRST = 1000  # a number covers up to this many robots rather than another number
 # In sizes of the text.
 SMALL = 0.8  # texts that matter less
 LARGE = 1.3  # and more
+LINE = 1.35  # from one line of a small text to the next
 ROOM = 3.7  # of all samples of a legend
 STEP = 1.1  # from one to the next
 
@@ -46,7 +48,13 @@ def font(size: float) -> Font:
 
 
 def draw_title(
-    draw: ImageDraw, footage: Footage, row: int, box: Box, size: int, curve: Colour
+    draw: ImageDraw,
+    footage: Footage,
+    row: int,
+    box: Box,
+    size: int,
+    curve: Colour,
+    theme: Theme = DARK,
 ) -> None:
     """Draw policy, mission, own parts and time above a scene, and its age in its curve's colour."""
     facts = footage.facts
@@ -57,30 +65,40 @@ def draw_title(
     left = box.left + size // 2
     right = box.right - size // 2
     top = box.top + size // 2
-    draw.text((left, top), facts.policy, palette.TEXT, large)
+    draw.text((left, top), facts.policy, theme.text, large)
     draw.text((right, top), f"age {footage.age_mean[row]:.1f} windows", curve, large, anchor="ra")
     below = top + 1.7 * size
-    what = f"{mission.task}, {mission.num_robots} robots, seed {facts.seed}"
-    lines = [what]
-    # A line for each thing that is said of where it was flown, for a title is narrow.
-    lines += [each for each in ", ".join(where_flown(mission)).split(", ") if each]
-    lines += facts.own_parts
-    draw.text((left, below), "\n".join(lines), palette.SENT, small)
+    draw.text((left, below), "\n".join(_title_lines(footage)), theme.note, small)
     time = f"{now * mission.window_s:.1f} s, window {now}"
-    draw.text((right, below), time, palette.SENT, small, anchor="ra")
+    draw.text((right, below), time, theme.note, small, anchor="ra")
     num_cut_off = int(np.sum(footage.is_cut_off[row]))
     if num_cut_off > 0:
         text = f"{num_cut_off} cut off from r{footage.ego}"
         draw.text((right, below + size), text, palette.TOO_WEAK, small, anchor="ra")
 
 
-def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: int) -> None:
+def title_height(footage: Footage, size: int) -> int:
+    """Return the height that a title needs, so that it does not touch the scene [pixels]."""
+    return round(size * (2.0 + SMALL * LINE * len(_title_lines(footage))))
+
+
+def _title_lines(footage: Footage) -> list[str]:
+    facts = footage.facts
+    lines = [f"{facts.mission.task}, {facts.mission.num_robots} robots, seed {facts.seed}"]
+    # A line for each thing that is said of where it was flown, for a title is narrow.
+    lines += [each for each in ", ".join(where_flown(facts.mission)).split(", ") if each]
+    return lines + facts.own_parts
+
+
+def draw_legend(
+    draw: ImageDraw, footages: Sequence[Footage], box: Box, size: int, theme: Theme = DARK
+) -> None:
     """Draw the ramp of ages, and the meaning of the packets' colours."""
     small = font(SMALL * size)
     observers = _observers(footages)
     full_scale = footages[0].facts.full_scale
-    text = f"colour: age of what {observers} (white) knows"
-    draw.text((box.left, box.top), text, palette.TEXT, small)
+    text = f"colour: age of what {observers} ({theme.ego_name}) knows"
+    draw.text((box.left, box.top), text, theme.text, small)
     y = box.top + 1.25 * size
     high = 0.55 * size
     edges = np.linspace(box.left, box.right, NUM_SHADES + 1)
@@ -88,9 +106,9 @@ def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: in
     for k, colour in enumerate(palette.age_colours(ages, full_scale).tolist()):
         draw.rectangle((edges[k], y, edges[k + 1], y + high), tuple(colour))
     y += 1.3 * high
-    draw.text((box.left, y), "0", palette.SENT, small)
-    draw.text((box.right, y), f"{full_scale:g} windows or more", palette.SENT, small, anchor="ra")
-    samples = _samples(footages, observers)
+    draw.text((box.left, y), "0", theme.note, small)
+    draw.text((box.right, y), f"{full_scale:g} windows or more", theme.note, small, anchor="ra")
+    samples = _samples(footages, observers, theme)
     # Two columns; the more samples there are, the closer they stand.
     step = min(STEP, ROOM / ((len(samples) + 1) // 2)) * size
     small = font(min(SMALL * size, 0.9 * step))
@@ -99,25 +117,28 @@ def draw_legend(draw: ImageDraw, footages: Sequence[Footage], box: Box, size: in
         x = box.left + column * (box.right - box.left) / 2
         line = round(y + 1.3 * size) + step * row
         if text == SHORTFALL:
-            _draw_tag(draw, "dB", x, line, small)
+            _draw_tag(draw, "dB", x, line, small, theme)
         else:
             _draw_sample(draw, colour, x, line + 0.45 * size, size)
-        draw.text((x + 1.5 * size, line), text, palette.SENT, small)
+        draw.text((x + 1.5 * size, line), text, theme.note, small)
 
 
 def _observers(footages: Sequence[Footage]) -> str:
     return " and ".join(dict.fromkeys(f"r{each.ego}" for each in footages))
 
 
-def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
+def _samples(footages: Sequence[Footage], observers: str, theme: Theme) -> dict[str, Colour]:
     samples = {"never heard of": palette.UNKNOWN}
     if any(each.has_motion for each in footages):
-        samples["heading"] = palette.HEADING
+        samples["heading"] = theme.heading
     if any(each.facts.is_broadcast for each in footages):
-        samples["packet heard"] = palette.BROADCAST
+        samples["packet heard"] = theme.shown(palette.BROADCAST)
     if not all(each.facts.is_broadcast for each in footages):
-        samples |= {"delivered": palette.DELIVERED, "lost": palette.LOST}
-        samples |= {"answered": palette.ANSWERED, "overheard": palette.OVERHEARD}
+        samples |= {"delivered": theme.shown(palette.DELIVERED), "lost": theme.shown(palette.LOST)}
+        samples |= {
+            "answered": theme.shown(palette.ANSWERED),
+            "overheard": theme.shown(palette.OVERHEARD),
+        }
     links = [each.mismatch.links[each.is_own(each.mismatch.links)] for each in footages]
     is_too_weak = np.concatenate(links)["is_too_weak"]
     if np.any(is_too_weak):
@@ -127,7 +148,7 @@ def _samples(footages: Sequence[Footage], observers: str) -> dict[str, Colour]:
     if np.any(is_too_weak):
         samples[SHORTFALL] = palette.TOO_WEAK
     if any(np.any(each.is_cut_off) for each in footages):
-        samples[f"halo: cut off from {observers} now"] = palette.CUT_OFF
+        samples[f"halo: cut off from {observers}"] = palette.CUT_OFF
     return samples
 
 
@@ -146,6 +167,7 @@ def draw_shortfalls(
     others: Int16[np.ndarray, "K"],
     margin_db: Int16[np.ndarray, "K"],
     size: int,
+    theme: Theme = DARK,
 ) -> None:
     """Write by how much links are too weak, next to the `others` at their far ends [pixels]."""
     small = font(0.75 * size)
@@ -163,7 +185,7 @@ def draw_shortfalls(
         best = int(np.argmin(covered))
         if covered[best] < LABELS_FIRST:
             x, y = low[best].tolist()
-            _draw_tag(draw, text, x + TAG, y, small)
+            _draw_tag(draw, text, x + TAG, y, small, theme)
             shown = np.append(shown, boxes[[best]], axis=0)
 
 
@@ -176,21 +198,24 @@ def _num_overlaps(
     return np.sum(np.all((low < other_high) & (other_low < high), axis=2), axis=1)
 
 
-def _draw_tag(draw: ImageDraw, text: str, x: float, y: float, small: Font) -> None:
-    # On a dark ground, so that it is read before anything.
+def _draw_tag(draw: ImageDraw, text: str, x: float, y: float, small: Font, theme: Theme) -> None:
+    # On a plain ground, so that it is read before anything.
     left, top, right, bottom = draw.textbbox((x, y), text, small)
-    draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), palette.BACKGROUND)
+    draw.rectangle((left - TAG, top - TAG, right + TAG, bottom + TAG), theme.background)
     draw.text((x, y), text, palette.TOO_WEAK, small)
 
 
 class AgePlot:
     """The mean age over the mission, of one flight or two, on a common axis."""
 
-    def __init__(self, footages: Sequence[Footage], box: Box, size: int) -> None:
+    def __init__(
+        self, footages: Sequence[Footage], box: Box, size: int, theme: Theme = DARK
+    ) -> None:
         """Prepare the curves, as points of the picture."""
         self._footages = footages
         self._box = box
         self._size = size
+        self._theme = theme
         inner = Box(
             left=box.left + 2 * size,
             top=round(box.top + 1.4 * size),
@@ -213,7 +238,7 @@ class AgePlot:
         inner = self._inner
         footages = self._footages
         title = "mean age of information [windows]"
-        draw.rectangle(inner, palette.GRID)
+        draw.rectangle(inner, self._theme.grid)
         # Two missions' columns would look alike.
         if len(footages) == 1 and np.any(footages[0].is_cut_off):
             title += f"; red: robots cut off from {_observers(footages)}, full height 100 %"
@@ -222,23 +247,25 @@ class AgePlot:
             for (right, _), part in zip(self._curves[0], shares, strict=True):
                 if part > 0.0:
                     top = inner.bottom - part * (inner.bottom - inner.top)
-                    draw.rectangle((left, top, right, inner.bottom), dim(palette.CUT_OFF, SHADE))
+                    draw.rectangle(
+                        (left, top, right, inner.bottom), self._theme.mixed(palette.CUT_OFF, SHADE)
+                    )
                 left = right
-        draw.text((inner.left, self._box.top), title, palette.TEXT, small)
+        draw.text((inner.left, self._box.top), title, self._theme.text, small)
         for y, value in ((inner.top, f"{self._top:g}"), (inner.bottom, "0")):
-            draw.text((inner.left - 4, y), value, palette.SENT, small, anchor="rm")
+            draw.text((inner.left - 4, y), value, self._theme.note, small, anchor="rm")
         below = inner.bottom + 2
-        draw.text((inner.left, below), "0", palette.SENT, small)
-        draw.text((inner.right, below), f"{self._end_s:g} s", palette.SENT, small, anchor="ra")
+        draw.text((inner.left, below), "0", self._theme.note, small)
+        draw.text((inner.right, below), f"{self._end_s:g} s", self._theme.note, small, anchor="ra")
         # From the start on: what is still to come sets the axis, which does not change.
-        for curve, colour in zip(self._curves, palette.FILM_CURVES, strict=False):
-            draw.line(curve, dim(colour, FAINT), 1)
+        for curve, colour in zip(self._curves, self._theme.curves, strict=False):
+            draw.line(curve, self._theme.mixed(colour, FAINT), 1)
 
     def draw_until(self, draw: ImageDraw, rows: Sequence[int]) -> None:
         """Draw the curves so far, and where they are now."""
         radius = max(2.0, self._size / 5)
         width = max(2, self._size // 8)
-        for curve, colour, row in zip(self._curves, palette.FILM_CURVES, rows, strict=False):
+        for curve, colour, row in zip(self._curves, self._theme.curves, rows, strict=False):
             if row > 0:
                 draw.line(curve[: row + 1], colour, width, joint="curve")
             draw.circle(curve[row], radius, colour)

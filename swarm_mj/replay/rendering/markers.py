@@ -12,6 +12,7 @@ from mujoco._structs import MjvCamera, MjvGeom, MjvScene
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, Ground
 from swarm_mj.replay.links import SEGMENTS, arcs, lifted
+from swarm_mj.replay.rendering.theme import DARK, Theme
 
 Shade: TypeAlias = np.ndarray | palette.Colour
 
@@ -35,9 +36,14 @@ DISC = mjtGeom.mjGEOM_CYLINDER
 NO_TURN = np.eye(3).ravel()
 NOWHERE = np.zeros(3)
 HALO_HEIGHT = 0.15  # around a robot that is cut off, by its radius
+TRAIL_S = 6.0  # that trails go back
+TRAIL_PIECES = 12
+TRAIL_SHARE = 0.55  # of a robot's colour in its trail
+RIM = 1.25  # the radius of a robot's rim, by the robot's
+RIM_HEIGHT = 0.2  # likewise: below the robot's top
 LINES_PER_ROBOT = 40  # mismatched links; of very dense teams, some are left out
-# A disc, a heading, a halo, arcs of all that a window can have, and lines.
-GEOMS_PER_ROBOT = 3 + 4 * SEGMENTS + LINES_PER_ROBOT
+# A disc with its rim, a heading, a halo, a trail, arcs of all that a window can have, and lines.
+GEOMS_PER_ROBOT = 4 + TRAIL_PIECES + 4 * SEGMENTS + LINES_PER_ROBOT
 
 
 class Camera(NamedTuple):
@@ -94,16 +100,19 @@ def look_at(ground: Ground, row: int, width: int, height: int) -> Camera:
     return camera._replace(distance_m=float(np.max(needed)))
 
 
-def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) -> None:
+def draw_markers(
+    scene: MjvScene, footage: Footage, row: int, camera: Camera, theme: Theme = DARK
+) -> None:
     """Add one window's robots, packets and links to a scene with `GEOMS_PER_ROBOT` to spare."""
     picture_m = max(camera.height, SMALLEST) * camera.pixel_m
     line_pixels = LINE * max(camera.height, SMALLEST)
-    _draw_robots(scene, footage, row, picture_m, line_pixels)
+    _draw_trails(scene, footage, row, line_pixels, theme)
+    _draw_robots(scene, footage, row, picture_m, line_pixels, theme)
     for fate, packets in footage.packets_at(row).items():
         style = palette.PACKETS[fate]
         for points in arcs(packets, ROBOT * picture_m, style.share):
             for start, end in itertools.pairwise(points):
-                _add_line(scene, start, end, style.colour, line_pixels)
+                _add_line(scene, start, end, theme.shown(style.colour), line_pixels)
     # Last, for of very dense teams there is no room for all; robots and packets go first.
     room = scene.maxgeom - scene.ngeom
     lines_m, colours = footage.mismatch_lines(row)
@@ -112,8 +121,29 @@ def draw_markers(scene: MjvScene, footage: Footage, row: int, camera: Camera) ->
         _add_line(scene, start, end, colour, line_pixels)
 
 
+def _draw_trails(
+    scene: MjvScene, footage: Footage, row: int, line_pixels: float, theme: Theme
+) -> None:
+    """Draw where robots came from in the last seconds, in their colours over the ground's."""
+    num_windows = round(TRAIL_S / footage.facts.mission.window_s)
+    shown = np.linspace(max(0, row - num_windows), row, TRAIL_PIECES + 1)
+    rows = np.unique(shown.round().astype(int))
+    way_m = footage.position_m[rows]
+    for i, colour in enumerate(footage.colours[row].tolist()):
+        faint = theme.mixed(theme.ego if i == footage.ego else tuple(colour), TRAIL_SHARE)
+        points_m = lifted(way_m[:, i], 0.0)
+        for start, end in itertools.pairwise(points_m):
+            if np.any(start != end):
+                _add_line(scene, start, end, faint, line_pixels)
+
+
 def _draw_robots(
-    scene: MjvScene, footage: Footage, row: int, picture_m: float, line_pixels: float
+    scene: MjvScene,
+    footage: Footage,
+    row: int,
+    picture_m: float,
+    line_pixels: float,
+    theme: Theme,
 ) -> None:
     velocity_mps = footage.velocity_mps[row]
     colours = footage.colours[row]
@@ -123,7 +153,12 @@ def _draw_robots(
         radius_m = (OBSERVER if i == footage.ego else ROBOT) * picture_m
         height_m = ROBOT_HEIGHT * radius_m
         size_m = np.array([radius_m, radius_m, 0.0])
-        _add(scene, DISC, colours[i], size_m, np.append(where, height_m))
+        colour = theme.ego if i == footage.ego else colours[i]
+        if theme.rim is not None:
+            flat_m = RIM_HEIGHT * radius_m
+            rim_m = np.array([RIM * radius_m, flat_m, 0.0])
+            _add(scene, DISC, theme.rim, rim_m, np.append(where, flat_m))
+        _add(scene, DISC, colour, size_m, np.append(where, height_m))
         if footage.is_cut_off[row, i]:
             flat_m = HALO_HEIGHT * radius_m
             wide_m = palette.HALO * radius_m
@@ -132,7 +167,7 @@ def _draw_robots(
         if np.any(way):
             start = np.append(where, height_m)
             end = np.append(where + way, height_m)
-            _add_line(scene, start, end, palette.HEADING, line_pixels)
+            _add_line(scene, start, end, theme.heading, line_pixels)
 
 
 def _add_line(

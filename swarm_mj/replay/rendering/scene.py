@@ -12,14 +12,17 @@ from jaxtyping import UInt8
 from mujoco._enums import mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._errors import FatalError
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
+from mujoco._specs import MjSpec
 from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvScene
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.obstacles import obstacle_geoms
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.rendering import markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
+from swarm_mj.replay.rendering.theme import DARK, Theme
 
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
 TILE_M = 200.0  # the floor's texture, two squares by two, assets/arena.xml
@@ -44,13 +47,20 @@ class SceneRenderer(ExitStack):
     """
 
     def __init__(
-        self, mission: Mission, width: int = 1280, height: int = 720, *, scene: Scene | None = None
+        self,
+        mission: Mission,
+        width: int = 1280,
+        height: int = 720,
+        *,
+        scene: Scene | None = None,
+        theme: Theme = DARK,
     ) -> None:
         """Compile the scene for pictures of this size [pixels]; OSError if no OpenGL works here."""
         super().__init__()
         self._size = (width, height)
         self._mission = mission
-        self._model = pictured(mission, scene, width, height)
+        self._theme = theme
+        self._model = pictured(mission, scene, width, height, theme)
         self._data = MjData(self._model)
         self._floor = functions.mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
         num_geoms = self._model.ngeom + mission.num_robots * markers.GEOMS_PER_ROBOT
@@ -91,7 +101,7 @@ class SceneRenderer(ExitStack):
         camera.aim(free)
         kinds = mjtCatBit.mjCAT_ALL.value
         functions.mjv_updateScene(self._model, data, self._options, None, free, kinds, self._scene)
-        markers.draw_markers(self._scene, footage, row, camera)
+        markers.draw_markers(self._scene, footage, row, camera, self._theme)
         picture = np.empty((height, width, 3), np.uint8)
         whole = MjrRect(0, 0, width, height)
         self._opengl.make_current()  # there may be other renderers
@@ -106,7 +116,9 @@ def _close(renderer: "ref[SceneRenderer]") -> None:
         left.close()
 
 
-def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> MjModel:
+def pictured(
+    mission: Mission, scene: Scene | None, width: int, height: int, theme: Theme = DARK
+) -> MjModel:
     """Compile a mission's scene for pictures of this size [pixels].
 
     Light comes from above, walls and obstacles are of glass, and an open area's floor is as wide
@@ -114,6 +126,7 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
     """
     spec = compose(mission, scene=scene)
     half_m = float(np.ceil(GROUND * mission.half_side_m / TILE_M) * TILE_M)
+    _paint(spec, theme)
     # By name, if they are there: a user's scene may have neither.
     for material in spec.materials:
         if material.name == "wall":
@@ -140,6 +153,24 @@ def pictured(mission: Mission, scene: Scene | None, width: int, height: int) -> 
         colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
         colour[3] = min(colour[3], OBSTACLE_OPACITY)
     return model
+
+
+def _paint(spec: MjSpec, theme: Theme) -> None:
+    """Give sky, floor and walls their colours, where a scene has them."""
+    for texture in spec.textures:
+        if texture.name == "sky":
+            texture.rgb1 = texture.rgb2 = _shares(theme.background)
+        elif texture.name == "squares":
+            first, second = theme.squares
+            texture.rgb1 = _shares(first)
+            texture.rgb2 = _shares(second)
+    for material in spec.materials:
+        if material.name == "wall":
+            material.rgba[:3] = _shares(theme.wall)
+
+
+def _shares(colour: Colour) -> list[float]:
+    return [share / 255.0 for share in colour]
 
 
 class SceneViewer:

@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw
 
-from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage
 from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rendering import drawing
 from swarm_mj.replay.rendering.scene import SceneRenderer
+from swarm_mj.replay.rendering.theme import THEMES
 from swarm_mj.replay.view import DEFAULTS, GIF, VideoStyle, fitted
 
 Picture = UInt8[np.ndarray, "H W 3"]
@@ -53,16 +53,25 @@ class Movie(ExitStack):
         top = bottom + pad
         legend = drawing.Box(pad, top, middle - 2 * pad, height - pad)
         right = drawing.Box(middle, top, width - 2 * pad, height - pad)
-        self._plot = drawing.AgePlot(footages, right, self._text)
-        self._empty = Image.new("RGB", (width, height), palette.BACKGROUND)
+        theme = self._theme = THEMES[style.theme]
+        self._plot = drawing.AgePlot(footages, right, self._text, theme)
+        self._empty = Image.new("RGB", (width, height), theme.background)
         draw = ImageDraw.Draw(self._empty)
-        drawing.draw_legend(draw, self._footages, legend, self._text)
+        drawing.draw_legend(draw, self._footages, legend, self._text, theme)
         self._plot.draw_axes(draw)
+        # Two scenes are narrow: titles would cover them.
+        heights = [drawing.title_height(each, self._text) for each in footages]
+        self._scene_top = max(heights) if len(footages) > 1 else 0
         with ExitStack() as opened:  # closes the first renderer if the second does not start
             self._renderers: list[SceneRenderer] = []
             for each, box in zip(footages, self._boxes, strict=True):
-                width = box.right - box.left
-                renderer = SceneRenderer(each.facts.mission, width, bottom, scene=each.scene)
+                renderer = SceneRenderer(
+                    each.facts.mission,
+                    width=box.right - box.left,
+                    height=bottom - self._scene_top,
+                    scene=each.scene,
+                    theme=theme,
+                )
                 self._renderers.append(opened.enter_context(renderer))
             self.push(opened.pop_all())
 
@@ -76,16 +85,20 @@ class Movie(ExitStack):
         """Return the picture of these windows, one of each mission, from 0."""
         picture = self._empty.copy()
         draw = ImageDraw.Draw(picture)
-        curves = palette.FILM_CURVES
-        parts = zip(self._footages, rows, self._boxes, self._renderers, curves, strict=False)
+        theme = self._theme
+        parts = zip(self._footages, rows, self._boxes, self._renderers, theme.curves, strict=False)
         for footage, row, box, renderer, curve in parts:
-            picture.paste(Image.fromarray(renderer.frame(footage, row)), (box.left, box.top))
-            drawing.draw_title(draw, footage, row, box, self._text, curve)
+            picture.paste(
+                Image.fromarray(renderer.frame(footage, row)), (box.left, self._scene_top)
+            )
+            drawing.draw_title(draw, footage, row, box, self._text, curve, theme)
             ground_m = lifted(footage.position_m[row], 0.0)
-            robots = renderer.camera(footage, row).pixels(ground_m) + np.array(box[:2])
-            drawing.draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text)
+            robots = renderer.camera(footage, row).pixels(ground_m) + np.array(
+                [box.left, self._scene_top]
+            )
+            drawing.draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text, theme)
         for box in self._boxes[1:]:
-            draw.line((box.left, 0, box.left, box.bottom), palette.BACKGROUND, SEAM)
+            draw.line((box.left, 0, box.left, box.bottom), theme.background, SEAM)
         self._plot.draw_until(draw, rows)
         return np.asarray(picture)
 
