@@ -73,7 +73,7 @@ class Flight:
 
 
 @runtime_checkable
-class Shown(Protocol):
+class LiveView(Protocol):
     """Shows a flight while it goes on: `swarm_mj.replay.live.LiveReplay`."""
 
     def show(self) -> None:
@@ -86,7 +86,7 @@ class Shown(Protocol):
 
 
 # Makes it, of a recorder and the flight's configuration.
-Shows: TypeAlias = Callable[[Recorder, Mapping[str, Any]], Shown]
+Shows: TypeAlias = Callable[[Recorder, Mapping[str, Any]], LiveView]
 
 
 class Flown(NamedTuple):
@@ -160,7 +160,7 @@ class _Watch(NamedTuple):
 
     bar: WorkBar
     recorder: Recorder | None
-    shown: Shown | None
+    shown: LiveView | None
     window_s: float  # that each window takes at least: a live flight may be slowed down
     windows_between_looks: int  # at the free memory; 0 never looks
 
@@ -174,7 +174,7 @@ class _Watch(NamedTuple):
             self.shown.show()
 
     def wait(self, start_s: float, num_windows: int, is_interrupted: Callable[[], bool]) -> None:
-        """Wait until it is time for the window after so many; Ctrl-C ends that, too."""
+        """Wait until the next window is due, after those flown; Ctrl-C ends that, too."""
         if self.window_s == 0.0:
             return
         until_s = start_s + num_windows * self.window_s
@@ -190,7 +190,7 @@ class _Watch(NamedTuple):
 
 
 def _watch(
-    flight: Flight, bar: WorkBar, recorder: Recorder | None, shown: Shown | None, *, looks: bool
+    flight: Flight, bar: WorkBar, recorder: Recorder | None, shown: LiveView | None, *, looks: bool
 ) -> _Watch:
     """Return what goes on after each window; it looks at the memory if it is to."""
     between = 0

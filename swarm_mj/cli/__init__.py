@@ -27,7 +27,7 @@ COMMANDS: dict[str, str] = {
     "fly": "Fly one mission and record its replay.",
     "policies": "List the communication policies: what each knows and sends.",
     "evaluate": "Compare policies on the same missions.",
-    "check": "Check that flocks converge in time; the exit code says whether they do.",
+    "check": "Check that flocks converge in time, by an exit code.",
     "study": "Fly a study that is a file, or compare two results.",
     "train": "Train a communication policy by PPO.",
     "curves": "Show the learning curves of training runs.",

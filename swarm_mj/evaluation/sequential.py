@@ -7,8 +7,6 @@ stops as soon as they please. These may be looked at after every mission.
 from typing import NamedTuple
 
 import numpy as np
-from scipy.optimize import root_scalar
-from scipy.special import betaincc, betaln
 
 
 class ShareBounds(NamedTuple):
@@ -44,6 +42,8 @@ def _lower_bound(num_held: int, num_failed: int, level: float) -> float:
     """Return the least share that the missions do not refute."""
     if num_held == 0:
         return 0.0
+    from scipy.optimize import root_scalar  # slow to import
+
     needed = np.log(2.0 / (1.0 - level))
 
     def excess(share: float) -> float:
@@ -72,6 +72,8 @@ def log_evidence(num_held: int, num_failed: int, share: float) -> float:
         num_failed: All others.
         share: Above 0, below 1.
     """
+    from scipy.special import betaincc, betaln  # slow to import
+
     # All shares were alike before; this is how likely those above `share` are after the missions.
     above = betaincc(num_held + 1, num_failed + 1, share)
     mixed = betaln(num_held + 1, num_failed + 1) + np.log(above) - np.log1p(-share)

@@ -57,7 +57,7 @@ def layout(out: RerunLog, *, is_live: bool = False, live_fps: float | None = Non
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot.
 
     A live one is for a flight that goes on: the plots' axes grow with it, and the viewer shows what
-    came last, or plays so many windows a second.
+    came last, or plays `live_fps` windows a second.
     """
     mission = rrb.Horizontal(
         _left(out, is_live=is_live),

@@ -64,7 +64,8 @@ def commits_of(paths):
 def test_all_results_are_of_one_clean_commit_and_newer_tables_of_another():
     released = []
     for path in sorted(RESULTS.rglob("*.csv")):
-        if not (HISTORY | NEWER) & {path, *path.parents}:
+        is_apart = (HISTORY | NEWER) & {path, *path.parents}
+        if not is_apart:
             released.append(path)
     for paths in (released, sorted(NEWER)):
         commits = commits_of(paths)
