@@ -8,7 +8,7 @@ from mixed_missions import MISSION as WALK
 from mixed_missions import flown
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.gnn.buffer_features import BufferFeatures
+from swarm_mj.policies.gnn.buffer_features import BufferFeatures, count_before, length
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.protocol.buffers import NEVER, empty_buffers
 from swarm_mj.protocol.window import LocalViews
@@ -141,3 +141,93 @@ def _renamed(views, order):
     return LocalViews(
         buffers=type(buffers)(**pairs, is_granted=buffers.is_granted), now=views.now, phases=()
     )
+
+
+def whole_arrays(views, mission):
+    """All features and who may be addressed, one whole array after the other, in no hurry."""
+    buffers = views.buffers
+    oneself = np.eye(views.num_robots, dtype=bool)
+    known = buffers.is_known | oneself
+    spoke = buffers.last_attempt.max(axis=2, keepdims=True)
+    staler = known & ~oneself & (buffers.timestamp < spoke)
+    since = np.where(oneself, spoke, np.where(known, buffers.timestamp, np.inf))
+    rank = np.sum(since[:, :, None, :] < since[:, :, :, None], axis=3)
+    attempt = np.where(oneself, spoke, buffers.last_attempt)
+    own_m = np.einsum("biix->bix", buffers.position_m)[:, :, None]
+    own_mps = np.einsum("biix->bix", buffers.velocity_mps)[:, :, None]
+    place = (buffers.position_m - own_m) * (known[..., None] * (1.0 / mission.range_m))
+    speed = (buffers.velocity_mps - own_mps) * (known[..., None] * (1.0 / mission.max_velocity_mps))
+    ranges = np.hypot(place[..., 0], place[..., 1])
+    near = known & ~oneself & (ranges <= 1.0)
+    distance = (np.minimum(ranges, 4.0) / 4.0).astype(np.float32)
+
+    def ages(then, is_granted):
+        age = np.minimum(views.now[:, None, None] - then, 500.0)
+        return np.where((then > NEVER) | is_granted, np.log1p(age) / np.log1p(500.0), 1.0)
+
+    def counts(is_counted, log=True):
+        number = is_counted.sum(axis=2, keepdims=True)
+        return np.log1p(number) / np.log1p(40.0) if log else number
+
+    columns = {
+        "is oneself": oneself[None],
+        "is known": known,
+        "age of T": ages(buffers.timestamp, known),
+        "age of L": ages(attempt, False),
+        "x, in ranges": np.clip(place[..., 0], -4.0, 4.0),
+        "y, in ranges": np.clip(place[..., 1], -4.0, 4.0),
+        "distance": distance,
+        "is in range": near,
+        "P is oneself": known & ~oneself & (buffers.parent == np.arange(views.num_robots)[:, None]),
+        "v_x": speed[..., 0],
+        "v_y": speed[..., 1],
+        "is staler": staler,
+        "rank by T": np.log1p(rank) / np.log1p(40.0),
+        "share of the team known": counts(known, log=False) / views.num_robots,
+        "neighbours": counts(near, log=False) / 10.0,
+        "size of the team": np.array([[[views.num_robots / 40.0]]]),
+        "staler robots within 0.25 ranges": counts(staler & (4.0 * distance <= 0.25)),
+        "staler robots within 0.5 ranges": counts(staler & (4.0 * distance <= 0.5)),
+        "staler robots within 1 range": counts(staler & (4.0 * distance <= 1.0)),
+        "staler robots within 2 ranges": counts(staler & (4.0 * distance <= 2.0)),
+        "staler robots": counts(staler),
+    }
+    assert tuple(columns) == FEATURES_OF_1_0["buffer"]
+    shape = known.shape
+    node = [np.broadcast_to(each, shape).astype(np.float32) for each in columns.values()]
+    rows = (-1, views.num_robots)
+    may_address = ~known | (distance <= np.float32(0.3))
+    return np.stack(node, axis=-1).reshape(*rows, len(columns)), may_address.reshape(rows)
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_one_pass_writes_what_whole_arrays_say(seed):
+    """In the one pass an age is looked up, and its logarithm may round otherwise."""
+    extractor = BufferFeatures(WALK)
+    for views in flown(seed):
+        graphs = extractor.graphs(views)
+        node, may_address = whole_arrays(views, WALK)
+        is_age = np.array(["age" in name for name in FEATURES_OF_1_0["buffer"]])
+        np.testing.assert_array_equal(graphs.node[..., ~is_age], node[..., ~is_age])
+        np.testing.assert_array_max_ulp(graphs.node[..., is_age], node[..., is_age], 1, np.float32)
+        np.testing.assert_array_equal(graphs.may_address, may_address)
+
+
+def test_lengths_are_those_of_hypot_in_single_precision():
+    """Also halfway between two of its numbers, where a last bit decides, and next to the range."""
+    rng = np.random.default_rng(0)
+    below = rng.uniform(0.0, 4.0, 5_000).astype(np.float32)
+    halfway = (below.astype(np.float64) + np.nextafter(below, np.float32(5.0))) / 2.0
+    next_to_range = 1.0 + rng.integers(-3, 4, 5_000) * 2.0**-53
+    lengths = np.concatenate([rng.uniform(0.0, 5.0, 5_000), halfway, next_to_range, [0.0, 1.0]])
+    angle = rng.uniform(0.0, 2.0 * np.pi, lengths.size)
+    x = lengths * np.cos(angle)
+    y = lengths * np.sin(angle)
+    found = np.array([length(*place) for place in zip(x.tolist(), y.tolist(), strict=True)])
+    np.testing.assert_array_equal(found.astype(np.float32), np.hypot(x, y).astype(np.float32))
+    np.testing.assert_array_equal(found <= 1.0, np.hypot(x, y) <= 1.0)
+
+
+def test_equal_times_have_the_same_rank():
+    times = np.array([3.0, 1.0, np.inf, 1.0, np.inf])
+    assert [count_before(time, times) for time in times] == [2, 0, 3, 0, 3]
