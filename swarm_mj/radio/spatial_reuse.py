@@ -22,7 +22,7 @@ FREE_SPACE = np.zeros((0, 0))  # in place of powers
 
 
 class _Belief(NamedTuple):
-    """The powers in which one robot believes, apart from `_Slot`: loops then copy fewer arrays.
+    """The powers in which one robot believes, apart from `Slot`: loops then copy fewer arrays.
 
     In free space there is no table of powers: nearly all robots are refused after a few of them, so
     that tables, which hold whole rows, would take ten times as long.
@@ -34,7 +34,7 @@ class _Belief(NamedTuple):
     threshold: float
 
 
-class _Slot(NamedTuple):
+class Slot(NamedTuple):
     """The senders of a slot so far, and the packets that stand.
 
     No `Air`: a packet that decodes keeps its receiver, whatever comes later, and its SINR is judged
@@ -45,48 +45,57 @@ class _Slot(NamedTuple):
     signal: Float[np.ndarray, "N"]  # of the packet that each robot decodes; 0 is none
     total: Float[np.ndarray, "N"]  # of all packets in the air
     near_m2: Float[np.ndarray, "N"]  # in free space, closer senders cost it that packet
+    power: Float[np.ndarray, "N"]  # of the sender that joins, at each robot
 
 
 @compiled()
+def empty_slot(num_robots: int) -> Slot:
+    """Return room for a slot by one robot's beliefs, and then by the next one's."""
+    return Slot(
+        is_sender=np.empty(num_robots, dtype=np.bool_),
+        signal=np.empty(num_robots),
+        total=np.empty(num_robots),
+        near_m2=np.empty(num_robots),
+        power=np.empty(num_robots),
+    )
+
+
+@compiled(makes_arrays=False)
 def write_joined(
-    believed_m: Float[np.ndarray, "B N N 2"],
-    is_known: Bool[np.ndarray, "B N N"],
-    turn: Int[np.ndarray, "B"],
+    believed_m: Float[np.ndarray, "N 2"],
+    is_known: Bool[np.ndarray, "N"],
+    turn: int,
+    asked: Int[np.ndarray, "N"],
     range_m: float,
     threshold: float,
-    has_joined: Float32[np.ndarray, "B N N"],
+    slot: Slot,
+    has_joined: Float32[np.ndarray, "N"],
 ) -> None:
-    """Write who sends in free space by the rule, in the order of identities, as each believes.
+    """Write who sends in free space by the rule, in the order of identities, as one robot believes.
 
-    `has_joined` is 1 where robot k sends, by robot i's beliefs, else 0. After the first robot that
-    is asked and unknown nobody joins. Other arguments are as of `keep_joined`.
+    `has_joined` is 1 where robot k sends, else 0. After the first robot that is asked and unknown
+    nobody joins. Those asked are of `ask_in_turn`, the slot is written; other arguments are as of
+    `keep_joined`.
     """
-    num_missions, num_robots = is_known.shape[:2]
-    at_1_m = threshold * range_m * range_m
-    for b in range(num_missions):
-        owner = int(turn[b]) % num_robots
-        asked = _asked(np.arange(num_robots), turn[b])
-        for i in range(num_robots):
-            if believes_as_the_last(believed_m[b], is_known[b], i):
-                has_joined[b, i] = has_joined[b, i - 1]
-                continue
-            has_joined[b, i] = 0.0
-            if is_known[b, i, owner]:
-                belief = _Belief(
-                    believed_m=believed_m[b, i],
-                    at_1_m=at_1_m,
-                    power=FREE_SPACE,
-                    threshold=threshold,
-                )
-                num_asked = 0
-                while num_asked < num_robots and is_known[b, i, asked[num_asked]]:
-                    num_asked += 1
-                is_sender = _senders(owner, asked[:num_asked], NOBODY, belief, None, b)
-                for k in range(num_robots):
-                    has_joined[b, i, k] = is_sender[k]
+    num_robots = is_known.shape[0]
+    owner = turn % num_robots
+    has_joined[:] = 0.0
+    if is_known[owner]:
+        belief = _Belief(
+            believed_m=believed_m,
+            at_1_m=threshold * range_m * range_m,
+            power=FREE_SPACE,
+            threshold=threshold,
+        )
+        num_asked = 0
+        while num_asked < num_robots and is_known[asked[num_asked]]:
+            num_asked += 1
+        _write_senders(owner, asked[:num_asked], NOBODY, belief, None, 0, slot)
+        for k in range(num_robots):
+            has_joined[k] = slot.is_sender[k]
 
 
-@compiled()
+@compiled(makes_arrays=False)
 def believes_as_the_last(
     believed_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"], i: int
 ) -> bool:
@@ -118,9 +127,10 @@ def keep_joined(
     """
     num_missions, num_robots = order.shape
     at_1_m = threshold * range_m * range_m
+    slot = empty_slot(num_robots)
     for b in range(num_missions):
         owner = order[b, turn[b] % num_robots]
-        asked = _asked(order[b], turn[b])
+        asked = ask_in_turn(order[b], turn[b])
         for i in range(num_robots):
             if i != owner and is_sending[b, i]:
                 power = FREE_SPACE
@@ -130,42 +140,40 @@ def keep_joined(
                 belief = _Belief(
                     believed_m=believed_m[b, i], at_1_m=at_1_m, power=power, threshold=threshold
                 )
-                is_sending[b, i] = _senders(owner, asked, i, belief, powers, b)[i]
+                _write_senders(owner, asked, i, belief, powers, b, slot)
+                is_sending[b, i] = slot.is_sender[i]
         is_sending[b, owner] = True
 
 
 @compiled()
-def _asked(order: Int[np.ndarray, "N"], turn: int) -> Int[np.ndarray, "N"]:
+def ask_in_turn(order: Int[np.ndarray, "N"], turn: int) -> Int[np.ndarray, "N"]:
     """Return who is asked to join, one after the other."""
     return np.roll(order, -(turn + order.shape[0] // 2))
 
 
-@compiled()
-def _senders(
+@compiled(makes_arrays=False)
+def _write_senders(
     owner: int,
     asked: Int[np.ndarray, "A"],
     last: int,
     belief: _Belief,
     powers: MeanPowers | None,
     b: int,
-) -> Bool[np.ndarray, "N"]:
-    """Return who sends: the owner of the turn, and who joins it up to the `last` that is asked."""
-    num_robots = belief.believed_m.shape[0]
-    is_sender = np.zeros(num_robots, dtype=np.bool_)
-    near_m2 = np.zeros(num_robots)
-    slot = _Slot(
-        is_sender=is_sender,
-        signal=np.zeros(num_robots),
-        total=np.zeros(num_robots),
-        near_m2=near_m2,
-    )
+    slot: Slot,
+) -> None:
+    """Write who sends: the owner of the turn, and who joins it up to the `last` that is asked."""
+    near_m2 = slot.near_m2
+    slot.is_sender[:] = False
+    slot.signal[:] = 0.0
+    slot.total[:] = 0.0
+    near_m2[:] = 0.0
     if powers is not None:
         compute_powers(powers, b, owner)
         compute_powers(powers, b, last)
     _join(owner, belief, slot)
     # A robot that may not join the owner alone may not join it with others either.
     if last != NOBODY and _refuser(last, owner, belief, slot) != NOBODY:
-        return is_sender
+        return
     refuser = owner
     for k in asked:
         # A sender that is asked again may not join either: nobody would gain by it.
@@ -179,11 +187,10 @@ def _senders(
             refuser = found
         if k == last:
             break
-    return is_sender
 
 
-@compiled()
-def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
+@compiled(makes_arrays=False)
+def _refuser(k: int, first: int, belief: _Belief, slot: Slot) -> int:
     """Return who would lose a packet if k sent, too; k itself if nobody would gain one; or NOBODY.
 
     The `first` is looked at first: who is in the way of one robot is likely to be in the way of
@@ -198,31 +205,34 @@ def _refuser(k: int, first: int, belief: _Belief, slot: _Slot) -> int:
     for n in range(-1, signal.shape[0]):
         j = first if n < 0 else n
         if j != k and not is_sender[j]:
-            power = _power(k, j, belief)
             if signal[j] > 0.0:
+                power = _power(k, j, belief)
                 if power > signal[j]:
                     return j
                 interference = total[j] - signal[j] + power
                 if not is_received(sinr(signal[j], interference, NOISE), belief.threshold):
                     return j
-            elif is_received(sinr(power, total[j], NOISE), belief.threshold):
-                is_of_use = True
+            elif not is_of_use:
+                power = _power(k, j, belief)
+                is_of_use = _decodes(power, total[j], belief.threshold)
     return NOBODY if is_of_use else k
 
 
-@compiled()
-def _join(k: int, belief: _Belief, slot: _Slot) -> None:
+@compiled(makes_arrays=False)
+def _join(k: int, belief: _Belief, slot: Slot) -> None:
     """Make k a sender: mark whom it reaches, and add its packet to the air."""
     is_sender = slot.is_sender
     signal = slot.signal
     total = slot.total
     near_m2 = slot.near_m2
     is_sender[k] = True
+    for j in range(signal.shape[0]):  # by itself, so that it is compiled to vectors
+        slot.power[j] = _power(k, j, belief)
     for j in range(signal.shape[0]):
         if j != k:
-            power = _power(k, j, belief)
+            power = slot.power[j]
             is_free = not is_sender[j] and signal[j] == 0.0
-            if is_free and is_received(sinr(power, total[j], NOISE), belief.threshold):
+            if is_free and _decodes(power, total[j], belief.threshold):
                 signal[j] = power
                 if belief.power.shape[0] == 0:  # later interference only adds to this
                     most = (1.0 + MARGIN) * power / belief.threshold - NOISE - total[j]
@@ -230,7 +240,13 @@ def _join(k: int, belief: _Belief, slot: _Slot) -> None:
             total[j] += power
 
 
-@compiled()
+@compiled(makes_arrays=False)
+def _decodes(power: float, interference: float, threshold: float) -> bool:
+    """Return whether a packet decodes; most are too weak without interference, which is quicker."""
+    return power >= threshold * NOISE and is_received(sinr(power, interference, NOISE), threshold)
+
+
+@compiled(makes_arrays=False)
 def _power(k: int, j: int, belief: _Belief) -> float:
     """Return the power of k's packets at j."""
     if belief.power.shape[0] == 0:

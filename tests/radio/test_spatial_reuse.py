@@ -10,7 +10,13 @@ from walls import walls
 from swarm_mj.mission import paper
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.power_law import no_powers
-from swarm_mj.radio.spatial_reuse import believes_as_the_last, keep_joined, write_joined
+from swarm_mj.radio.spatial_reuse import (
+    ask_in_turn,
+    believes_as_the_last,
+    empty_slot,
+    keep_joined,
+    write_joined,
+)
 
 seeds = st.integers(0, 2**32 - 1)
 thresholds = st.sampled_from([0.3, 1.25, 4.0])
@@ -31,31 +37,45 @@ def test_eq3_those_who_may_send_and_join_do(seed, num_robots, threshold):
     assert set(np.flatnonzero(is_sending[0]).tolist()) == expected
 
 
+def joined(believed_m, is_known, turn, threshold):
+    """Who sends by each robot's beliefs, one after the other in the same room."""
+    num_robots = len(is_known)
+    slot = empty_slot(num_robots)
+    has_joined = np.full((num_robots, num_robots), 7.0, dtype=np.float32)
+    for i in range(num_robots):
+        write_joined(
+            believed_m=believed_m[i],
+            is_known=is_known[i],
+            turn=turn,
+            asked=ask_in_turn(np.arange(num_robots), turn),
+            range_m=250.0,
+            threshold=threshold,
+            slot=slot,
+            has_joined=has_joined[i],
+        )
+    assert np.all((has_joined == 0.0) | (has_joined == 1.0))
+    return [np.flatnonzero(row).tolist() for row in has_joined]
+
+
 @given(seed=seeds, num_robots=st.integers(2, 12), threshold=thresholds)
 def test_eq3_each_robot_goes_by_its_own_beliefs(seed, num_robots, threshold):
     """Robot i believes in places of its own, and the order is that of identities."""
     rng = np.random.default_rng(seed)
-    believed_m = rng.uniform(-500, 500, (1, num_robots, num_robots, 2))
+    believed_m = rng.uniform(-500, 500, (num_robots, num_robots, 2))
     turn = int(rng.integers(0, 99))
-    has_joined = np.ones((1, num_robots, num_robots), dtype=np.float32)
-    is_known = np.ones((1, num_robots, num_robots), dtype=bool)
-    write_joined(believed_m, is_known, np.array([turn]), 250.0, threshold, has_joined)
+    is_known = np.ones((num_robots, num_robots), dtype=bool)
     order = np.arange(num_robots)
-    for i in range(num_robots):
-        expected = agreed_senders(order, turn, believed_m[0, i], radio(250.0, threshold))
-        assert set(np.flatnonzero(has_joined[0, i]).tolist()) == expected
+    for i, its in enumerate(joined(believed_m, is_known, turn, threshold)):
+        assert set(its) == agreed_senders(order, turn, believed_m[i], radio(250.0, threshold))
 
 
 @pytest.mark.parametrize(("unknown", "expected"), [(0, []), (3, [0, 2]), (2, [0])])
 def test_nobody_joins_after_a_robot_of_unknown_place(unknown, expected):
     """Two pairs far apart: robot 2 is asked first, then 3, 0 and 1; the turn is robot 0's."""
     position_m = np.array([[0.0, 0.0], [100.0, 0.0], [1000.0, 0.0], [1100.0, 0.0]])
-    believed_m = np.tile(position_m, (1, 4, 1, 1))
-    is_known = np.ones((1, 4, 4), dtype=bool)
-    is_known[..., unknown] = False
-    has_joined = np.empty((1, 4, 4), dtype=np.float32)
-    write_joined(believed_m, is_known, np.array([0]), 250.0, 1.0, has_joined)
-    assert [np.flatnonzero(row).tolist() for row in has_joined[0]] == [expected] * 4
+    is_known = np.ones((4, 4), dtype=bool)
+    is_known[:, unknown] = False
+    assert joined(np.tile(position_m, (4, 1, 1)), is_known, 0, 1.0) == [expected] * 4
 
 
 WALLS = walls(10**-1.5, 0, 1)  # 15 dB each

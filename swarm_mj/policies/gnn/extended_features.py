@@ -9,16 +9,27 @@ from itertools import compress
 from typing import Annotated, ClassVar
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32, Int, Shaped
+from jaxtyping import Bool, Float, Float32, Shaped
 
 from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.gnn.features import Feature, dtype_of, features_of, names_of
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import Memory, empty_memory, log_age, logarithm, remember
 from swarm_mj.policies.gnn.scales import ADDRESS_RANGES, CROWD, FAR_RANGES, TEAM
-from swarm_mj.policies.gnn.turns import Column, count_near, write_turns
+from swarm_mj.policies.gnn.turns import (
+    Beliefs,
+    count_near,
+    empty_beliefs,
+    take_beliefs,
+    write_turns,
+)
 from swarm_mj.protocol.window import LocalViews
-from swarm_mj.radio.spatial_reuse import believes_as_the_last, write_joined
+from swarm_mj.radio.spatial_reuse import (
+    ask_in_turn,
+    believes_as_the_last,
+    empty_slot,
+    write_joined,
+)
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.decibels import from_db
 
@@ -83,51 +94,26 @@ class ExtendedFeatures(FeatureExtractor):
         num_robots = views.num_robots
         node = np.empty(buffers.timestamp.shape, dtype=NODE)
         may_address = np.empty(node.shape, dtype=np.bool_)
-        is_known = buffers.is_known | np.eye(num_robots, dtype=np.bool_)
-        window = views.now.astype(np.int64)
-        _write_ages(
+        is_observed = buffers.is_known
+        is_known = is_observed | np.eye(num_robots, dtype=np.bool_)
+        _write_nodes(
             memory=self._memory,
             last_attempt=buffers.last_attempt,
-            is_observed=buffers.is_known,
+            is_observed=is_observed,
+            is_known=is_known,
             believed_m=buffers.position_m,
             now=views.now,
             range_m=range_m,
+            threshold=from_db(self._mission.sinr_threshold_db),
             node=node,
             may_address=may_address,
         )
-        _write_news(self._memory, node)  # by who is near, which is written by now
-        _write_beliefs(
-            believed_m=buffers.position_m,
-            is_known=is_known,
-            window=window,
-            range_m=range_m,
-            node=node,
-        )
-        has_joined = node["has_joined"]  # a view
-        self._write_joined(buffers.position_m, is_known, window, has_joined)
-        rows = (len(window) * num_robots, num_robots)
+        rows = (len(node) * num_robots, num_robots)
         return Graphs(
             node=node.view(np.float32).reshape(*rows, len(ExtendedFeatures.names)),
             parent=buffers.parent.reshape(rows),
             may_address=may_address.reshape(rows),
-            has_turn=np.diagonal(has_joined, axis1=1, axis2=2).reshape(-1) > 0.0,
-        )
-
-    def _write_joined(
-        self,
-        believed_m: Places,
-        is_known: Flags,
-        window: Int[np.ndarray, "B"],
-        has_joined: Float32[np.ndarray, "B N N"],
-    ) -> None:
-        """Write who has a turn by interference, as each robot believes."""
-        write_joined(
-            believed_m=believed_m,
-            is_known=is_known,
-            turn=window,
-            range_m=self._mission.range_m,
-            threshold=from_db(self._mission.sinr_threshold_db),
-            has_joined=has_joined,
+            has_turn=np.diagonal(node["has_joined"], axis1=1, axis2=2).reshape(-1) > 0.0,
         )
 
 
@@ -145,75 +131,133 @@ class LocalFeatures(ExtendedFeatures):
 
 
 @compiled()
-def _write_ages(
+def _write_nodes(
     memory: Memory,
     last_attempt: Float[np.ndarray, "B N N"],
     is_observed: Flags,
+    is_known: Flags,
     believed_m: Places,
     now: Float[np.ndarray, "B"],
     range_m: float,
+    threshold: float,
     node: Nodes,
     may_address: Flags,
 ) -> None:
-    """Write all but news, and what follows from positions and the clock alone."""
+    """Write every robot's graph, and whom it may address."""
     num_missions, num_robots = node.shape[:2]
+    beliefs = empty_beliefs(num_robots)
+    slot = empty_slot(num_robots)
     for b in range(num_missions):
-        rank = (np.arange(num_robots) - int(now[b])) % num_robots / num_robots
+        window = int(now[b])
+        asked = ask_in_turn(np.arange(num_robots), window)
+        turn_rank = (np.arange(num_robots) - window) % num_robots / num_robots
         for i in range(num_robots):
-            num_known = np.sum(is_observed[b, i]) + (not is_observed[b, i, i])
-            known_share = num_known / num_robots
-            for k in range(num_robots):
-                of_k: ExtendedNode = node[b, i, k]
-                is_known = k == i or is_observed[b, i, k]
-                ranges = math.sqrt(squared_distance(believed_m[b, i], k, i)) / range_m
-                # One of unknown position may be near, so it may be addressed.
-                may_address[b, i, k] = not is_known or ranges <= ADDRESS_RANGES
-                of_k.is_oneself = k == i
-                of_k.is_known = is_known
-                of_k.timestamp_age = log_age(
-                    now[b], memory.timestamp[b, i, k], is_observed[b, i, k]
+            # One robot's nodes after the other's: they fit into the processor's nearest memory.
+            its = node[b, i]
+            _write_ages(
+                memory=memory,
+                b=b,
+                i=i,
+                last_attempt=last_attempt[b, i],
+                is_observed=is_observed[b, i],
+                is_known=is_known[b, i],
+                believed_m=believed_m[b, i],
+                now=now[b],
+                range_m=range_m,
+                turn_rank=turn_rank,
+                its=its,
+                may_address=may_address[b, i],
+            )
+            _write_news(memory, b, i, its)  # by who is near, which is written by now
+            # Of a team at rest most robots believe the same: no need to count all of it again.
+            if believes_as_the_last(believed_m[b], is_known[b], i):
+                _copy_beliefs(its, node[b, i - 1])
+            else:
+                take_beliefs(believed_m[b, i], is_known[b, i], beliefs)
+                _write_beliefs(beliefs, window, range_m, its)
+                write_joined(
+                    believed_m=believed_m[b, i],
+                    is_known=is_known[b, i],
+                    turn=window,
+                    asked=asked,
+                    range_m=range_m,
+                    threshold=threshold,
+                    slot=slot,
+                    has_joined=its["has_joined"],
                 )
-                of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known else 0.0
-                of_k.is_near = is_known and k != i and ranges <= 1.0
-                of_k.heard_age = log_age(now[b], memory.heard[b, i, k])
-                of_k.attempt_age = log_age(now[b], last_attempt[b, i, k])
-                of_k.addressed_age = log_age(now[b], memory.addressed_by[b, i, k])
-                of_k.turn_rank = rank[k]
-                of_k.known_share = known_share
-                of_k.team_size = num_robots / TEAM
-            # Of oneself at the end: a choice in the loop would double the time that it takes.
-            of_itself: ExtendedNode = node[b, i, i]
-            of_itself.heard_age = log_age(now[b], memory.sent[b, i])
 
 
-@compiled()
-def _write_news(memory: Memory, node: Nodes) -> None:
+@compiled(forceinline=True, makes_arrays=False)
+def _write_ages(
+    memory: Memory,
+    b: int,
+    i: int,
+    last_attempt: Float[np.ndarray, "N"],
+    is_observed: Bool[np.ndarray, "N"],
+    is_known: Bool[np.ndarray, "N"],
+    believed_m: Float[np.ndarray, "N 2"],
+    now: float,
+    range_m: float,
+    turn_rank: Float[np.ndarray, "N"],
+    its: OwnNodes,
+    may_address: Bool[np.ndarray, "N"],
+) -> None:
+    """Write all but news, and what follows from positions and the clock alone."""
+    num_robots = len(its)
+    num_known = 0
+    for k in range(num_robots):
+        num_known += is_known[k]
+    for k in range(num_robots):
+        of_k: ExtendedNode = its[k]
+        ranges = math.sqrt(squared_distance(believed_m, k, i)) / range_m
+        # One of unknown position may be near, so it may be addressed.
+        may_address[k] = not is_known[k] or ranges <= ADDRESS_RANGES
+        of_k.is_oneself = k == i
+        of_k.is_known = is_known[k]
+        of_k.timestamp_age = log_age(now, memory.timestamp[b, i, k], is_observed[k])
+        of_k.distance = min(ranges, FAR_RANGES) / FAR_RANGES if is_known[k] else 0.0
+        of_k.is_near = is_known[k] and k != i and ranges <= 1.0
+        of_k.heard_age = log_age(now, memory.heard[b, i, k])
+        of_k.attempt_age = log_age(now, last_attempt[k])
+        of_k.addressed_age = log_age(now, memory.addressed_by[b, i, k])
+        of_k.turn_rank = turn_rank[k]
+        of_k.known_share = num_known / num_robots
+        of_k.team_size = num_robots / TEAM
+    # Of oneself at the end: a choice in the loop would double the time that it takes.
+    of_itself: ExtendedNode = its[i]
+    of_itself.heard_age = log_age(now, memory.sent[b, i])
+
+
+@compiled(forceinline=True, makes_arrays=False)
+def _write_news(memory: Memory, b: int, i: int, its: OwnNodes) -> None:
     """Write what a robot's packet would tell its neighbours; its own news is to all of them."""
-    num_missions, num_robots = node.shape[:2]
-    for b in range(num_missions):
-        for i in range(num_robots):
-            own = memory.timestamp[b, i]
-            said = memory.said[b, i]
-            news = 0.0
-            unsaid_news = 0.0
-            for k in range(num_robots):
-                of_k: ExtendedNode = node[b, i, k]
-                # Who is out of range cannot be reached, so there is no news to it.
-                of_k.news = 0.0
-                of_k.unsaid_news = 0.0
-                if of_k.is_near > 0.0:
-                    of_k.news, of_k.unsaid_news = _rises(own, memory.neighbour[b, i, k], said)
-                    # Sums first and logarithms then: what is said to all adds up in windows.
-                    news += of_k.news
-                    unsaid_news += of_k.unsaid_news
-                    of_k.news = logarithm(of_k.news)
-                    of_k.unsaid_news = logarithm(of_k.unsaid_news)
-            of_itself: ExtendedNode = node[b, i, i]
-            of_itself.news = logarithm(news)
-            of_itself.unsaid_news = logarithm(unsaid_news)
+    own = memory.timestamp[b, i]
+    said = memory.said[b, i]
+    for k in range(len(its)):
+        of_k: ExtendedNode = its[k]
+        # Who is out of range cannot be reached, so there is no news to it.
+        of_k.news = 0.0
+        of_k.unsaid_news = 0.0
+        if of_k.is_near > 0.0:
+            packet = memory.packet[b, k, memory.decoded[b, i, k]]
+            of_k.news, of_k.unsaid_news = _rises(own, packet, said)
+    # Sums first and logarithms then: what is said to all adds up in windows. And apart from the
+    # loop above, in which the processor can then fetch several packets from memory at once.
+    news = 0.0
+    unsaid_news = 0.0
+    for k in range(len(its)):
+        of_near: ExtendedNode = its[k]
+        if of_near.is_near > 0.0:
+            news += of_near.news
+            unsaid_news += of_near.unsaid_news
+            of_near.news = logarithm(of_near.news)
+            of_near.unsaid_news = logarithm(of_near.unsaid_news)
+    of_itself: ExtendedNode = its[i]
+    of_itself.news = logarithm(news)
+    of_itself.unsaid_news = logarithm(unsaid_news)
 
 
-@compiled(fastmath=True)
+@compiled(fastmath=True, makes_arrays=False)
 def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[float, float]:
     """Mean rise of a neighbour's T if it heard all: by its packet, or also by one's own."""
     zero = np.float32(0.0)
@@ -225,56 +269,20 @@ def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[fl
     return by_packet / own.shape[0], by_both / own.shape[0]
 
 
-@compiled()
-def _write_beliefs(
-    believed_m: Places,
-    is_known: Flags,
-    window: Int[np.ndarray, "B"],
-    range_m: float,
-    node: Nodes,
-) -> None:
+@compiled(makes_arrays=False)
+def _write_beliefs(beliefs: Beliefs, window: int, range_m: float, its: OwnNodes) -> None:
     """Write neighbours and turns by distance, which follow from positions and the clock alone."""
-    num_missions, num_robots = is_known.shape[:2]
-    # Columns of their own, with which the inner loops are compiled to vectors.
-    x_m = np.empty(num_robots)
-    y_m = np.empty(num_robots)
-    known_x_m = np.empty(num_robots)
-    known_y_m = np.empty(num_robots)
-    is_close = np.empty(num_robots)
-    for b in range(num_missions):
-        for i in range(num_robots):
-            its = node[b, i]
-            # Of a team at rest most robots believe the same: no need to count all of it again.
-            if believes_as_the_last(believed_m[b], is_known[b], i):
-                _copy_beliefs(its, node[b, i - 1])
-                continue
-            num_known = 0
-            for k in range(num_robots):
-                x_m[k] = believed_m[b, i, k, 0]
-                y_m[k] = believed_m[b, i, k, 1]
-                known_x_m[num_known] = x_m[k]
-                known_y_m[num_known] = y_m[k]
-                num_known += is_known[b, i, k]  # else the next one takes its place
-            for k in range(num_robots):
-                of_each: ExtendedNode = its[k]
-                of_each.neighbours = 0.0
-                if is_known[b, i, k]:
-                    num_near = count_near(
-                        known_x_m[:num_known], known_y_m[:num_known], x_m[k], y_m[k], range_m
-                    )
-                    of_each.neighbours = (num_near - 1) / CROWD  # for it finds itself
-            _write_turns_by_radius(
-                x_m=x_m,
-                y_m=y_m,
-                is_known=is_known[b, i],
-                window=window[b],
-                range_m=range_m,
-                its=its,
-                is_close=is_close,
-            )
+    count_near(beliefs, range_m)
+    for k in range(len(its)):
+        of_k: ExtendedNode = its[k]
+        # It finds itself, too; who is unknown finds nobody.
+        of_k.neighbours = max(0.0, beliefs.num_near[k] - 1.0) / CROWD
+    write_turns(beliefs, window, 1.5 * range_m, its["has_turn_1_5"])
+    write_turns(beliefs, window, 2.0 * range_m, its["has_turn_2"])
+    write_turns(beliefs, window, 3.0 * range_m, its["has_turn_3"])
 
 
-@compiled()
+@compiled(makes_arrays=False)
 def _copy_beliefs(its: OwnNodes, last: OwnNodes) -> None:
     """Write a robot's neighbours and turns, which are those of the robot before it."""
     for k in range(its.shape[0]):
@@ -284,43 +292,4 @@ def _copy_beliefs(its: OwnNodes, last: OwnNodes) -> None:
         of_k.has_turn_1_5 = same.has_turn_1_5
         of_k.has_turn_2 = same.has_turn_2
         of_k.has_turn_3 = same.has_turn_3
-
-
-@compiled()
-def _write_turns_by_radius(
-    x_m: Column,
-    y_m: Column,
-    is_known: Bool[np.ndarray, "N"],
-    window: int,
-    range_m: float,
-    its: OwnNodes,
-    is_close: Column,
-) -> None:
-    """Write one robot's turns at the three radii, as `write_turns` does."""
-    write_turns(
-        x_m=x_m,
-        y_m=y_m,
-        is_known=is_known,
-        window=window,
-        radius_m=1.5 * range_m,
-        has_turn=its["has_turn_1_5"],
-        is_close=is_close,
-    )
-    write_turns(
-        x_m=x_m,
-        y_m=y_m,
-        is_known=is_known,
-        window=window,
-        radius_m=2.0 * range_m,
-        has_turn=its["has_turn_2"],
-        is_close=is_close,
-    )
-    write_turns(
-        x_m=x_m,
-        y_m=y_m,
-        is_known=is_known,
-        window=window,
-        radius_m=3.0 * range_m,
-        has_turn=its["has_turn_3"],
-        is_close=is_close,
-    )
+        of_k.has_joined = same.has_joined

@@ -8,7 +8,7 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Float, Float32, Int, Int16
 
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.timestamps import (
@@ -20,7 +20,9 @@ from swarm_mj.protocol.timestamps import (
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
+UNKEPT = -1
 LONG_WINDOWS = 500.0  # ages count by their logarithm, up to 1 at this one [windows]
+LOG_LONG = math.log1p(LONG_WINDOWS)
 
 
 class Memory(NamedTuple):
@@ -29,7 +31,8 @@ class Memory(NamedTuple):
     heard: Float32[np.ndarray, "B N N"]  # when i last decoded a packet of k itself [windows]
     addressed_by: Float32[np.ndarray, "B N N"]  # when such a packet was last meant for i [windows]
     sent: Float32[np.ndarray, "B N"]  # when i last spoke first [windows]
-    neighbour: Float32[np.ndarray, "B N N N"]  # T^{k,j} in the last packet of k that i decoded
+    packet: Float32[np.ndarray, "B N N N"]  # T^{k,j} in each packet of k that someone remembers
+    decoded: Int16[np.ndarray, "B N N"]  # which of these packets of k is the last that i decoded
     said: Float32[np.ndarray, "B N N"]  # T^{i,j} when i last spoke first [windows]
     timestamp: Float32[np.ndarray, "B N N"]  # T^{i,j} when the last window ended [windows]
 
@@ -42,14 +45,16 @@ def empty_memory(num_missions: int, num_robots: int) -> Memory:
         heard=_never(pairs),
         addressed_by=_never(pairs),
         sent=_never(robots),
-        neighbour=_never((*pairs, num_robots)),
+        packet=_never((*pairs, num_robots)),
+        decoded=np.zeros(pairs, dtype=np.int16),
         said=_never(pairs),
         timestamp=_never(pairs),
     )
 
 
 def _never(shape: tuple[int, ...]) -> Float32[np.ndarray, "..."]:
-    return np.full(shape, NEVER, dtype=np.float32)
+    assert NEVER == 0.0  # zeros take no memory until something else is written
+    return np.zeros(shape, dtype=np.float32)
 
 
 def remember(memory: Memory, views: LocalViews) -> None:
@@ -86,6 +91,7 @@ def _take_in(
         observe_own(memory.timestamp[b], time[b])
         # Packets leave all at once, so none holds what another one just brought.
         packet = memory.timestamp[b].copy()
+        kept = np.full(len(packet), UNKEPT)  # as which of its packets each sender's is remembered
         for i, k in enumerate(heard[b]):
             # An answer does not count as speaking first.
             if is_transmission and recipient[b, i] != i:
@@ -93,24 +99,40 @@ def _take_in(
                 memory.said[b, i] = packet[i]
             if k != i:
                 memory.heard[b, i, k] = time[b]
-                memory.neighbour[b, i, k] = packet[k]
+                if kept[k] == UNKEPT:
+                    kept[k] = _find_forgotten(memory.decoded[b, :, k], k)
+                    memory.packet[b, k, kept[k]] = packet[k]
+                memory.decoded[b, i, k] = kept[k]
                 if recipient[b, k] == i:
                     memory.addressed_by[b, i, k] = time[b]
         merge_timestamps(packet, heard[b], memory.timestamp[b])
 
 
 @compiled()
+def _find_forgotten(decoded: Int16[np.ndarray, "N"], sender: int) -> int:
+    """Return the first of a sender's N packets that none of the others remembers."""
+    # Robots share what they decoded together, and the first places are used again and again: that
+    # stays in the processor's memory, where a copy for each pair of robots would not.
+    is_remembered = np.zeros(len(decoded), dtype=np.bool_)
+    for i in range(len(decoded)):
+        if i != sender:
+            is_remembered[decoded[i]] = True
+    place = 0
+    while is_remembered[place]:  # N - 1 robots remember N - 1 packets at most
+        place += 1
+    return place
+
+
+@compiled()
 def logarithm(windows: float) -> float:
     """Return a time on a logarithmic scale, up to 1 at `LONG_WINDOWS`."""
-    return math.log1p(windows) / math.log1p(LONG_WINDOWS)
+    return math.log1p(windows) / LOG_LONG
 
 
 # Ages are of whole and half windows, so almost all of them are looked up: logarithms were most of
 # the time that these features take.
 NUM_AGES = round(SLOTS_PER_WINDOW * LONG_WINDOWS)
-LOG_AGES = np.array(
-    [math.log1p(n / SLOTS_PER_WINDOW) / math.log1p(LONG_WINDOWS) for n in range(NUM_AGES)]
-)
+LOG_AGES = np.array([math.log1p(n / SLOTS_PER_WINDOW) / LOG_LONG for n in range(NUM_AGES)])
 
 
 @compiled()

@@ -1,33 +1,62 @@
 """Turns that follow from one robot's beliefs, in a common order thinned by distance."""
 
+from typing import NamedTuple
+
 import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from swarm_mj.system.compiled import compiled
 
-Column = Float[np.ndarray, "N"]
+
+class Beliefs(NamedTuple):
+    """Where one robot believes the others to be, in columns: loops over them become vectors."""
+
+    is_known: Bool[np.ndarray, "N"]
+    x_m: Float[np.ndarray, "N"]  # infinitely far off if it is unknown
+    y_m: Float[np.ndarray, "N"]
+    num_near: Float[np.ndarray, "N"]  # room for `count_near`
+    is_close: Float[np.ndarray, "N"]  # room for `write_turns`
 
 
 @compiled()
-def count_near(x_m: Column, y_m: Column, from_x_m: float, from_y_m: float, radius_m: float) -> int:
-    """Return how many of some places are within a radius of one."""
-    num_near = 0
-    for n in range(len(x_m)):
-        dx = x_m[n] - from_x_m
-        dy = y_m[n] - from_y_m
-        num_near += dx * dx + dy * dy <= radius_m * radius_m
-    return num_near
+def empty_beliefs(num_robots: int) -> Beliefs:
+    """Return room for the beliefs of one robot, and then of the next one."""
+    return Beliefs(
+        is_known=np.empty(num_robots, dtype=np.bool_),
+        x_m=np.empty(num_robots),
+        y_m=np.empty(num_robots),
+        num_near=np.empty(num_robots),
+        is_close=np.empty(num_robots),
+    )
 
 
-@compiled()
+@compiled(makes_arrays=False)
+def take_beliefs(
+    believed_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"], beliefs: Beliefs
+) -> None:
+    """Take the beliefs of one robot."""
+    for k in range(len(is_known)):
+        beliefs.is_known[k] = is_known[k]
+        beliefs.x_m[k] = believed_m[k, 0] if is_known[k] else np.inf
+        beliefs.y_m[k] = believed_m[k, 1]
+
+
+@compiled(makes_arrays=False)
+def count_near(beliefs: Beliefs, radius_m: float) -> None:
+    """Count for each known robot who is within a radius of it, itself included; else 0."""
+    x_m, y_m, num_near = beliefs.x_m, beliefs.y_m, beliefs.num_near
+    num_near[:] = 0.0
+    for k in range(len(x_m)):
+        # Added up robot by robot, as numbers of one kind: a count in whole numbers takes longer.
+        for j in range(len(x_m)):
+            dx = x_m[j] - x_m[k]
+            dy = y_m[j] - y_m[k]
+            num_near[j] += 1.0 if dx * dx + dy * dy <= radius_m * radius_m else 0.0
+
+
+@compiled(makes_arrays=False)
 def write_turns(
-    x_m: Column,
-    y_m: Column,
-    is_known: Bool[np.ndarray, "N"],
-    window: int,
-    radius_m: float,
-    has_turn: Float32[np.ndarray, "N"],
-    is_close: Column,
+    beliefs: Beliefs, window: int, radius_m: float, has_turn: Float32[np.ndarray, "N"]
 ) -> None:
     """Write 1 for the robots that have a turn by one robot's beliefs, 0 for the others.
 
@@ -35,15 +64,16 @@ def write_turns(
     t. After it the others join in the order of their identities, unless they are closer than the
     radius to a robot that has joined (a maximal independent set); from half a round away on, so
     that no robot's turns come close to each other. A robot of unknown position may be near anyone,
-    so nobody joins after it. `is_close` is overwritten: room to mark who is too close.
+    so nobody joins after it.
     """
-    num_robots = is_known.shape[0]
+    x_m, y_m, is_close = beliefs.x_m, beliefs.y_m, beliefs.is_close
+    num_robots = len(x_m)
     has_turn[:] = 0.0
     is_close[:] = 0.0
-    half_round = (window + num_robots // 2) % num_robots
-    for place in range(num_robots + 1):
-        k = window % num_robots if place == 0 else (half_round + place - 1) % num_robots
-        if not is_known[k]:
+    k = window % num_robots
+    next_k = (window + num_robots // 2) % num_robots
+    for _ in range(num_robots + 1):
+        if not beliefs.is_known[k]:
             break
         if is_close[k] == 0.0 and has_turn[k] == 0.0:
             has_turn[k] = 1.0
@@ -52,3 +82,5 @@ def write_turns(
                 dy = y_m[j] - y_m[k]
                 # Written each time: a choice whether to write would keep the loop from vectors.
                 is_close[j] = 1.0 if dx * dx + dy * dy < radius_m * radius_m else is_close[j]
+        k = next_k
+        next_k = next_k + 1 if next_k + 1 < num_robots else 0

@@ -11,8 +11,9 @@ from mixed_missions import MISSION as WALK
 from mixed_missions import NUM_ROBOTS, SEEDS, flown
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures, write_turns
+from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
+from swarm_mj.policies.gnn.turns import empty_beliefs, take_beliefs, write_turns
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.window import LocalViews, Phase
 
@@ -238,10 +239,11 @@ RADII = np.array([100.0, 150.0, 300.0])
 
 def turns(believed_m, is_known, now, radius_m=RADII):
     """Who has a turn by one robot's beliefs [radius, robot]."""
-    x_m, y_m = np.array(believed_m, dtype=float).T.copy()
+    beliefs = empty_beliefs(len(is_known))
+    take_beliefs(np.array(believed_m, dtype=float), np.array(is_known), beliefs)
     has_turn = np.full((len(radius_m), len(is_known)), 7.0, dtype=np.float32)
     for radius, its in zip(radius_m, has_turn, strict=True):
-        write_turns(x_m, y_m, np.array(is_known), now, radius, its, np.full(len(its), 7.0))
+        write_turns(beliefs, now, radius, its)
     assert np.all((has_turn == 0.0) | (has_turn == 1.0))
     return has_turn == 1.0
 

@@ -1,6 +1,7 @@
 """What robots remember of packets, against loops over the packets that the simulator sent."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -8,10 +9,11 @@ from mixed_missions import NUM_ROBOTS, SEEDS, random_recipients
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.gnn.packet_memory import empty_memory, log_age, remember
+from swarm_mj.protocol.window import Phase
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
 
-ARRAYS = ("heard", "addressed_by", "sent", "neighbour", "said")
+ARRAYS = ("heard", "addressed_by", "sent", "said")
 
 
 class Wire:
@@ -45,6 +47,14 @@ class Diary:
             self.addressed_by[sender] = now
 
 
+def neighbours(memory):
+    """T in the last packet of each robot that each one decoded [mission, receiver, sender]."""
+    missions, receivers, senders = np.indices(memory.decoded.shape)
+    packets = memory.packet[missions, senders, memory.decoded]
+    packets[receivers == senders] = 0.0  # nobody decodes itself, so nothing is kept for that
+    return packets
+
+
 def read_packets(diaries, packets, now):
     """A window's two phases, half a window each: who spoke first, then who answered."""
     for phase, (timestamp, recipient, heard) in enumerate(packets):
@@ -74,8 +84,28 @@ def test_alg1_memory_is_what_was_sent_and_decoded(make, task):
         for name in ARRAYS:
             expected = [[getattr(diary, name) for diary in team] for team in diaries]
             np.testing.assert_array_equal(getattr(memory, name), expected, err_msg=f"{now} {name}")
+        expected = [[diary.neighbour for diary in team] for team in diaries]
+        np.testing.assert_array_equal(neighbours(memory), expected, err_msg=f"{now}")
     for name in ("heard", "addressed_by"):
         assert np.mean(getattr(memory, name) > 0.0) > 0.2
+
+
+def test_every_robot_may_remember_another_packet():
+    """Robot 0 speaks window after window, and each time another robot decodes it, twice round."""
+    num_robots = 5
+    memory = empty_memory(1, num_robots)
+    views = Swarm(paper("stationary", num_robots=num_robots), [0]).views
+    silent = np.arange(num_robots)[np.newaxis]
+    last = {}
+    for now in range(1, 9):
+        listener = 1 + now % (num_robots - 1)
+        heard = silent.copy()
+        heard[0, listener] = 0
+        phases = (Phase(recipient=silent, heard=heard), Phase(recipient=silent, heard=silent))
+        remember(memory, replace(views, now=np.array([float(now)]), phases=phases))
+        last[listener] = now - 0.5  # when robot 0 observed itself
+    for robot, when in last.items():
+        assert neighbours(memory)[0, robot, 0, 0] == when
 
 
 @pytest.mark.parametrize("age", [0.0, 0.5, 1.0, 17.5, 499.5, 0.3, 499.9, 500.0, 2_000.5])

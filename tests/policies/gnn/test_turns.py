@@ -2,23 +2,21 @@
 
 import numpy as np
 
-from swarm_mj.policies.gnn.turns import count_near, write_turns
+from swarm_mj.policies.gnn.turns import count_near, empty_beliefs, take_beliefs, write_turns
 
-X_M = np.array([0.0, 100.0, 200.0, 300.0])
-Y_M = np.zeros(4)
+BELIEVED_M = np.array([[0.0, 0.0], [100.0, 0.0], [200.0, 0.0], [300.0, 0.0]])
+EVERYONE = (True, True, True, True)
 
 
-def turns(window, *, radius_m=150.0, known=(True, True, True, True)):
+def beliefs(known=EVERYONE):
+    room = empty_beliefs(4)
+    take_beliefs(BELIEVED_M, np.array(known), room)
+    return room
+
+
+def turns(window, *, radius_m=150.0, known=EVERYONE):
     has_turn = np.full(4, 9.0, dtype=np.float32)  # what was there before counts for nothing
-    write_turns(
-        x_m=X_M,
-        y_m=Y_M,
-        is_known=np.array(known),
-        window=window,
-        radius_m=radius_m,
-        has_turn=has_turn,
-        is_close=np.full(4, 9.0),
-    )
+    write_turns(beliefs(known), window, radius_m, has_turn)
     return has_turn.tolist()
 
 
@@ -36,9 +34,24 @@ def test_nobody_joins_after_a_robot_that_may_be_anywhere():
     assert turns(0, known=(False, True, True, True)) == [0.0, 0.0, 0.0, 0.0]
 
 
-def test_places_within_a_radius_are_counted():
-    assert [count_near(X_M, Y_M, 100.0, 0.0, radius_m) for radius_m in (99.0, 100.0, 200.0)] == [
-        1,
-        3,
-        4,
-    ]
+def near(radius_m, known=EVERYONE):
+    room = beliefs(known)
+    count_near(room, radius_m)
+    return room.num_near.tolist()
+
+
+def test_robots_within_a_radius_are_counted_and_oneself_too():
+    assert near(99.0) == [1, 1, 1, 1]
+    assert near(100.0) == [2, 3, 3, 2]
+    assert near(200.0) == [3, 4, 4, 3]
+
+
+def test_robots_of_unknown_place_are_near_nobody():
+    assert near(100.0, known=(True, False, True, True)) == [1, 0, 2, 2]
+
+
+def test_the_next_beliefs_take_the_place_of_the_last():
+    room = beliefs((True, False, True, True))
+    take_beliefs(BELIEVED_M, np.array(EVERYONE), room)
+    count_near(room, 100.0)
+    assert room.num_near.tolist() == [2, 3, 3, 2]
