@@ -58,6 +58,7 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         self._batches = np.full(num_envs, batch, dtype=object)
         self._num_robots = batch.mission.num_robots
         self._rows = np.arange(num_envs)
+        self._flies_as_one = True  # in one batch, row by row, as long as none began alone
         self._is_over = np.zeros(num_envs, dtype=np.bool_)
         self._rngs = [seeding.np_random()[0] for _ in range(num_envs)]  # that draw later seeds
         self.single_observation_space, self.single_action_space = team_spaces(batch)
@@ -143,12 +144,16 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         was_over = self._is_over.copy()  # in the mode NEXT_STEP; they begin in this step
         is_same_step = self.autoreset_mode == AutoresetMode.SAME_STEP
         for batch in dict.fromkeys(self._batches[~was_over]):
-            envs = np.flatnonzero(self._batches == batch)
-            rows = self._rows[envs]
-            recipient = batch.flown.views.silence.copy()
-            recipient[rows] = actions[envs]
-            reward[envs] = batch.step(recipient)[rows, 0]
-            self._is_over[envs] = batch.is_over
+            if self._flies_as_one:
+                reward[:] = batch.step(actions)[:, 0]
+                self._is_over[:] = batch.is_over
+            else:
+                envs = np.flatnonzero(self._batches == batch)
+                rows = self._rows[envs]
+                recipient = batch.flown.views.silence.copy()
+                recipient[rows] = actions[envs]
+                reward[envs] = batch.step(recipient)[rows, 0]
+                self._is_over[envs] = batch.is_over
             self._note(final_infos if batch.is_over and is_same_step else infos, batch)
         ends = self._is_over & ~was_over
         if final_infos:
@@ -207,20 +212,25 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
         batch.restart(begun)  # in the swarm that flew exactly these, if there is one
         self._batches[envs] = batch
         self._rows[envs] = np.arange(envs.size)
+        self._flies_as_one = envs.size == self.num_envs
         self._is_over[envs] = False
         self._note(infos, batch)
 
     def _note(self, infos: Info, batch: MissionBatch) -> None:
         """Keep what a batch shows, and write its infos next to masks of whose they are."""
+        if self._flies_as_one:
+            # By reference: picking rows copies every number, twice.
+            self._seen.update(batch.observation)
+            for name, each in batch.infos().items():
+                infos[name] = each.copy()
+                infos[f"_{name}"] = np.ones(self.num_envs, dtype=np.bool_)
+            return
         envs = np.flatnonzero(self._batches == batch)
         rows = self._rows[envs]
-        is_all = np.array_equal(rows, np.arange(self.num_envs))  # as long as none began alone
         for name, each in batch.observation.items():
-            if is_all:  # by reference: picking rows copies every number, twice
-                self._seen[name] = each
-            else:  # in a copy: what was shown before is the user's own
-                self._seen[name] = self._seen[name].copy()
-                self._seen[name][envs] = each[rows]
+            # In a copy: what was shown before is the user's own.
+            self._seen[name] = self._seen[name].copy()
+            self._seen[name][envs] = each[rows]
         for name, each in batch.infos().items():
             own = infos.setdefault(name, np.zeros(self.num_envs, dtype=each.dtype))
             is_own = infos.setdefault(f"_{name}", np.zeros(self.num_envs, dtype=np.bool_))
