@@ -30,6 +30,9 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
     mission = paper("stationary", num_robots=num_robots)
     for num_missions in (1, 32):
         yield from _network_rows(mission, num_missions, seconds, clock)
+    for features in ("buffer", "extended"):
+        ratio = _features_windows(features, mission, 32, seconds)
+        yield Row(f"{features} features, 32 missions, in windows", ratio, "{:.2f}")
     ratio = _environment_windows(mission, 32, seconds)
     yield Row("a step of make_vec, 32 missions, default features, in windows", ratio, "{:.2f}")
     for credit in ("robot", "team"):
@@ -42,6 +45,23 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
         decide = _forward(FastAggregationGnn(shape), node[:1], parent[:1])
         decision_us = microseconds(decide, seconds / 2, clock)
         yield Row(f"one robot's decision, network of {name}", decision_us, "{:.0f} µs")
+
+
+def _features_windows(features: str, mission: Mission, num_missions: int, seconds: float) -> float:
+    """Return the time of features over that of a window of the missions that they are made of."""
+    swarm = Swarm(mission, range(num_missions))
+    seen = Swarm(mission, range(num_missions))
+    swarm.start(RoundRobin())
+    seen.start(RoundRobin())
+    extractor = make_extractor(features, mission)
+    extractor.start(num_missions, mission.num_robots)
+
+    def step_and_see() -> None:
+        seen.step()
+        extractor.graphs(seen.views)
+
+    window_us, both_us = in_turn_us((swarm.step, step_and_see), seconds)
+    return both_us / window_us - 1.0
 
 
 def _environment_windows(mission: Mission, num_missions: int, seconds: float) -> float:
