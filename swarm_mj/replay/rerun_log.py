@@ -34,7 +34,7 @@ CROWD = 400  # robots from which on they are drawn smaller, so that they do not 
 
 @dataclass(kw_only=True)
 class Drawn:
-    """What is known of all pieces of a flight that were drawn: what stands still shows it."""
+    """The facts about all pieces drawn so far that the layout and still things depend on."""
 
     ground: Ground  # with the lowest and the highest centre
     order: list[int]  # of robots in the age matrix, as they are drawn
