@@ -72,8 +72,8 @@ class Flight:
 
 
 @runtime_checkable
-class Shown(Protocol):
-    """Shows a flight while it goes on: `swarm_mj.replay.live.LiveReplay`."""
+class LiveShow(Protocol):
+    """An object that shows a flight while it goes on: `swarm_mj.replay.live.LiveReplay`."""
 
     def show(self) -> None:
         """Show what was flown, after every window."""
@@ -85,7 +85,7 @@ class Shown(Protocol):
 
 
 # Makes it, of a recorder and the flight's configuration.
-Shows: TypeAlias = Callable[[Recorder, Mapping[str, Any]], Shown]
+Shows: TypeAlias = Callable[[Recorder, Mapping[str, Any]], LiveShow]
 
 
 class Flown(NamedTuple):
@@ -157,7 +157,7 @@ class _Watch(NamedTuple):
 
     bar: WorkBar
     recorder: Recorder | None
-    shown: Shown | None
+    shown: LiveShow | None
     window_s: float  # that each window takes at least: a live flight may be slowed down
     windows_between_looks: int  # at the free memory; 0 never looks
 
@@ -187,7 +187,7 @@ class _Watch(NamedTuple):
 
 
 def _watch(
-    flight: Flight, bar: WorkBar, recorder: Recorder | None, shown: Shown | None, *, looks: bool
+    flight: Flight, bar: WorkBar, recorder: Recorder | None, shown: LiveShow | None, *, looks: bool
 ) -> _Watch:
     """Return what goes on after each window; it looks at the memory if it is to."""
     between = 0
