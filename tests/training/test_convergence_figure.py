@@ -47,12 +47,12 @@ def test_the_law_stands_beside_the_medians_and_their_bands(folder):
     law = lines["perfect knowledge"]
     assert law.get_xdata()[0] == pytest.approx(0.1)
     np.testing.assert_allclose(law.get_ydata()[:2], [5.85 * 0.81, 5.85 * 0.81**2])
-    np.testing.assert_allclose(lines["TDMA"].get_ydata()[0], 4.5)
+    np.testing.assert_allclose(lines["tdma"].get_ydata()[0], 4.5)
     assert len(axes.collections) == 2
     assert axes.get_yscale() == "log"
     assert "7 missions, seeds 3 to 9; commit ab" in figure.get_supxlabel()
     shown = {text.get_text() for text in axes.get_legend().get_texts()}
-    assert shown == {"TDMA", "MST", "perfect knowledge"}
+    assert shown == {"tdma", "mst", "perfect knowledge"}
 
 
 def test_it_is_written_twice(folder):

@@ -31,7 +31,7 @@ GAP_IN = 0.35
 BOTTOM_IN = 0.75
 # Of the width: where panels begin and end, and where the curves' names do, to the right of them.
 LEFT = 0.085
-RIGHT = 0.8
+RIGHT = 0.775
 MARGIN = 0.985
 # How the head says what is fixed in a figure.
 FIXED: dict[MissionField, str] = {

@@ -49,7 +49,7 @@ OTHERS = {
         label="proven floor", colour="#cccccc", marker="_", marker_size=6.0, line_width=2.5
     ),
     "perfect knowledge": Look(
-        label="perfect knowledge", colour="#999999", marker="_", marker_size=4.0, line_width=1.0
+        label="perfect knowledge", colour="#b3b3b3", marker="_", marker_size=4.0, line_width=1.0
     ),
     "GNN": GNN,
     "linear GNN": VARIANT,
