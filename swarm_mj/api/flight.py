@@ -19,6 +19,7 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.api.run import Run
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import count_strayed
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
@@ -121,7 +122,8 @@ def fly_mission(
     """
     mission = flight.mission
     check_observer(flight.observer, mission.num_robots)
-    registry.check_used(flight.arguments.features, [flight.policy])
+    arguments = flight.arguments
+    registry.check_used(arguments.features, arguments.networks, [flight.policy])
     with console.status("Preparing the swarm ...") as status, compiling(status.update):
         swarm = Swarm(mission, [flight.seed], **flight.components.given)
         swarm.start(flight.policy)
@@ -141,6 +143,7 @@ def fly_mission(
     numbers["wall_seconds"] = wall_s
     numbers["interrupted"] = code != DONE
     numbers["heard_share"] = _heard_share(swarm)
+    numbers["strayed"] = _num_strayed(swarm)
     run = Run(
         mission=mission,
         config=flight.config(),
@@ -171,7 +174,7 @@ class _Watch(NamedTuple):
             self.shown.show()
 
     def wait(self, start_s: float, num_windows: int, is_interrupted: Callable[[], bool]) -> None:
-        """Wait until it is time for the next window; Ctrl-C ends that, too."""
+        """Wait until the next window is due, after those flown; Ctrl-C ends that, too."""
         if self.window_s == 0.0:
             return
         until_s = start_s + num_windows * self.window_s
@@ -241,6 +244,15 @@ def _heard_share(swarm: Swarm) -> float:
         is_known = is_known[is_on][:, is_on]
     own = len(is_known)  # a robot knows itself
     return float((np.sum(is_known) - own) / (is_known.size - own))
+
+
+def _num_strayed(swarm: Swarm) -> int:
+    """Return how many active robots have no other within the mission's range."""
+    states = swarm.states
+    is_active = states.is_active
+    if is_active is None:
+        is_active = np.ones(states.position_m.shape[:2], dtype=np.bool_)
+    return int(count_strayed(states.position_m, swarm.mission.range_m, is_active)[0])
 
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:

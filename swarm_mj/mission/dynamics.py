@@ -16,7 +16,7 @@ class Dynamics:
 
     physics: PhysicsMode = setting(
         "exact",
-        "exact: point masses by Eq. 15; contact: forces and collisions",
+        "exact: point masses by the paper's dynamics; contact: forces and collisions",
         label="physics",
         source="IV-A",
         choices=get_args(PhysicsMode),
