@@ -75,6 +75,8 @@ def test_two_missions_make_one_gif(flown, here):
         ("--video a.mp4 --size 161x160", "size of an MP4 must be even"),
         ("--video a.mp4 --web", "--web is not allowed with --video"),
         ("--seconds 5", "are of videos; name one by --video"),
+        ("--theme light", "are of videos; name one by --video"),
+        ("--video a.mp4 --theme blue", "theme must be one of dark, light, not"),
         ("--picture a.png --video a.mp4", "--video is not allowed with --picture"),
         ("--picture a.jpg", "picture must be named *.png or *.svg or *.pdf, not a.jpg"),
         ("--picture a.png --size 320x200", "are of videos; name one by --video"),

@@ -37,6 +37,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         f"width of every layer, 1 to 1024 (default: {robot.network.latent}, team: 64)",
         f"at the start, 1e-09 to 1 (default: {robot.ppo.learning_rate}, team: 0.0001)",
         f"entropy bonus, 0 to 10 (default: {robot.ppo.entropy}, team: 1e-06)",
+        "evaluations and earlier sessions included, more than 0",
         f"(default: {robot.features}, team: the preset's own)",
         f"side by side, 1 to 4096 (default: {robot.missions}, team: {team.missions})",
         "is the same policy, 0 or more (default: 0)",

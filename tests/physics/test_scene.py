@@ -217,6 +217,40 @@ def test_a_scene_cannot_switch_the_solver_s_parts_off():
     assert not spec.option.disableflags & mujoco.mjtDisableBit.mjDSBL_LIMIT
 
 
+@pytest.mark.parametrize(
+    ("name", "value"),
+    [("size", [10.0, 0.0, 0.0]), ("type", mujoco.mjtGeom.mjGEOM_BOX), ("pos", [0.0, 0.0, 1.0])],
+)
+def test_a_scene_that_changes_robots_hulls_is_refused(name, value):
+    """Collisions and `--collide` are between spheres of one size."""
+
+    def swelling(spec, _mission):
+        setattr(spec.geom("r2/hull"), name, value)
+
+    with pytest.raises(ValueError, match=f"must leave the robots' hulls, but changed {name} of r2"):
+        compose(paper("random-walk", num_robots=3, collide=True), scene=swelling)
+
+
+def test_an_arena_s_file_cannot_change_robots_hulls(tmp_path):
+    """Its defaults and its own parts of these names are its own."""
+    file = tmp_path / "lab.xml"
+    file.write_text(
+        '<mujoco><default><geom size="10"/></default><worldbody>'
+        '<geom name="r0/hull" type="sphere" pos="50 0 5" group="1"/></worldbody></mujoco>'
+    )
+    model = compose(paper("random-walk", num_robots=3, arena=str(file))).compile()
+    assert model.geom("r0/hull").size[0] == ROBOT_RADIUS_M
+    assert model.geom("arena/r0/hull").size[0] == 10.0
+
+
+def test_a_scene_that_renames_a_joint_is_refused():
+    def renaming(spec, _mission):
+        spec.joint("r1/x").name = "mine"
+
+    with pytest.raises(ValueError, match="scene renaming adds joint mine"):
+        compose(paper("random-walk", num_robots=3), scene=renaming)
+
+
 def test_a_scene_that_deletes_a_robot_s_hull_is_refused():
     def robbing(spec, _mission):
         spec.delete(spec.geom("r1/hull"))

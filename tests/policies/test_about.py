@@ -163,6 +163,11 @@ def test_a_users_own_policy_is_known_where_it_is_loaded(mine):
     assert "never_loaded_here" not in sys.modules
 
 
+@pytest.mark.parametrize("name", LISTED)
+def test_figures_call_a_policy_as_it_is_typed(name):
+    assert LISTED[name].look.label == name
+
+
 def test_memory_is_that_of_the_class():
     mission = paper("random-walk", num_robots=10, num_windows=16)
     rest = paper("stationary", num_robots=10, num_windows=16)

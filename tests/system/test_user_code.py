@@ -3,6 +3,7 @@
 import json
 import sys
 
+import mujoco
 import pytest
 
 from swarm_mj.mission import paper
@@ -160,6 +161,16 @@ def test_errors_of_others_are_left_alone():
     load("channel", "own_parts:decoder")
     with pytest.raises(json.JSONDecodeError), one_line_each():
         json.loads("x")
+
+
+def test_a_message_of_pybind_is_shortened_to_what_was_wrong(parts):
+    (parts / "windy.py").write_text("def make(spec):\n    spec.option.wind = 'x'\n    return spec")
+    with pytest.raises(
+        ValueError, match="TypeError: incompatible function arguments; Invoked"
+    ) as it:
+        make("scene", "windy:make", mujoco.MjSpec())
+    assert str(it.value).endswith("(windy.py, line 2)")
+    assert "The following" not in str(it.value)
 
 
 def test_the_file_of_loaded_code_is_known(parts):

@@ -141,6 +141,7 @@ def draw(curve: list[tuple[int, float]], path: str) -> None:
     flown = swarm_mj.evaluate(
         list(BASELINES), mission, num_missions=len(HELD_OUT), seed=HELD_OUT[0]
     ).summary
+    plt.style.use("swarm_mj.evaluation.figures.paper")
     figure, axes = plt.subplots(figsize=(6.4, 3.6), layout="constrained")
     windows, ages = zip(*curve, strict=True)
     axes.plot(windows, ages, label="MAPPO, with a critic that sees the truth")

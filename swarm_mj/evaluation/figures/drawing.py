@@ -29,6 +29,7 @@ TOP_IN = 0.86
 PANEL_IN = 3.3
 GAP_IN = 0.35
 BOTTOM_IN = 0.75
+CAPTION_IN = 0.14  # more for each further line of the caption
 # Of the width: where panels begin and end, and where the curves' names do, to the right of them.
 LEFT = 0.085
 RIGHT = 0.775
@@ -97,7 +98,9 @@ def draw_curves(
         The figure, which `style.save` writes.
     """
     num_panels = len(figure.panels)
-    height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + BOTTOM_IN
+    origin = caption(figure, found)
+    bottom_in = BOTTOM_IN + origin.count("\n") * CAPTION_IN
+    height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + bottom_in
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, height_in))
         grid = drawing.subplots(num_panels, sharex=True, squeeze=False)
@@ -105,7 +108,7 @@ def draw_curves(
             left=LEFT,
             right=RIGHT,
             top=1.0 - TOP_IN / height_in,
-            bottom=BOTTOM_IN / height_in,
+            bottom=bottom_in / height_in,
             hspace=GAP_IN / PANEL_IN,
         )
         for axes, panel, shown in zip(grid[:, 0], figure.panels, costs, strict=True):
@@ -115,8 +118,8 @@ def draw_curves(
             axes.autoscale_view()  # or else the names would be placed by the limits before
             name_ends(axes, shown)
         grid[-1, 0].set_xlabel(figure.x_label)
-        _head(drawing, figure, found, height_in)
-        write_caption(drawing, caption(figure, found), LEFT, 0.12 / height_in)
+        _head(drawing, figure, found, costs, height_in)
+        write_caption(drawing, origin, LEFT, 0.12 / height_in)
     return drawing
 
 
@@ -191,7 +194,11 @@ def _set_axes(axes: Axes, figure: ResultFigure, panel: Panel, shown: Sequence[Cu
 
 
 def _head(
-    drawing: Figure, figure: ResultFigure, results: Sequence[Result], height_in: float
+    drawing: Figure,
+    figure: ResultFigure,
+    results: Sequence[Result],
+    costs: Sequence[Sequence[Curve]],
+    height_in: float,
 ) -> None:
     """Write what the figure shows and what is fixed in it, and the key of lines and markers."""
     fixed = [FIXED[name].format(getattr(results[0], name)) for name in figure.fixed]
@@ -202,7 +209,9 @@ def _head(
     ours = Line2D([], [], color=FAINT, marker="o", markersize=4.5)
     theirs = Line2D([], [], color=FAINT, marker="o", markersize=4.5 * RING)
     theirs.set(linestyle="--", linewidth=1.2, markerfacecolor="white")
-    handles = {"this package, mean ± SEM": ours, "published, mean ± SEM": theirs}
+    handles = {"this package, mean ± SEM": ours}
+    if any(curve.is_published for shown in costs for curve in shown):
+        handles["published, mean ± SEM"] = theirs
     if any(map(carries_more, results)):
         handles[f"{MORE}: {LARGER_PACKETS}"] = Line2D([], [], linestyle="")
     drawing.legend(

@@ -10,13 +10,20 @@ from moments import moment
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import LINK, SEGMENTS, LinkMismatch
-from swarm_mj.replay.rendering.markers import FOV_Y_DEG, draw_markers, look_at
+from swarm_mj.replay.rendering.markers import (
+    FOV_Y_DEG,
+    TRAIL_PIECES,
+    TRAIL_S,
+    draw_markers,
+    look_at,
+)
+from swarm_mj.replay.rendering.theme import DARK, LIGHT
 
 
-def drawn(footage):
+def drawn(footage, row=0, theme=DARK):
     scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
     scene.ngeom = 0
-    draw_markers(scene, footage, 0, look_at(footage.ground, 0, 640, 480))
+    draw_markers(scene, footage, row, look_at(footage.ground, row, 640, 480), theme)
     return [scene.geoms[k] for k in range(scene.ngeom)]
 
 
@@ -41,6 +48,23 @@ def test_a_robot_that_is_cut_off_has_a_flat_red_halo():
     np.testing.assert_allclose(halo.rgba[:3] * 255.0, palette.CUT_OFF)
     assert halo.size[0] > robot.size[0]
     assert halo.size[2] < 0.3 * robot.size[2]
+
+
+def test_a_robot_that_moved_has_a_trail_and_one_at_rest_has_none():
+    seen = moment([(0.0, 0.0), (100.0, 0.0)], num_windows=200)
+    seen.position_m[:, 1, 0] += np.arange(200.0)
+    trail = drawn(seen, 199)[:-2]
+    assert len(trail) == TRAIL_PIECES
+    np.testing.assert_allclose(trail[0].pos[:2], (100 + 199 - TRAIL_S / 0.1, 0))
+    np.testing.assert_allclose(end(trail[-1])[:2], (299, 0))
+
+
+def test_on_light_ground_robots_have_rims_and_the_observer_is_black():
+    rim, observer, *others = drawn(moment([(0.0, 0.0), (100.0, 0.0)]), theme=LIGHT)
+    assert rim.size[0] > observer.size[0]
+    assert rim.size[2] < observer.size[2]
+    np.testing.assert_allclose(observer.rgba[:3] * 255.0, LIGHT.ego)
+    assert len(others) == 2
 
 
 def test_links_that_surprise_are_drawn_until_there_is_no_room():

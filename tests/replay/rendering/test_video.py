@@ -11,6 +11,7 @@ from PIL import Image, ImageSequence
 
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import NO_MISMATCH
+from swarm_mj.replay.rendering import drawing
 from swarm_mj.replay.rendering.video import Movie, encode_gif, encode_mp4, make_video
 from swarm_mj.replay.view import VideoStyle
 
@@ -52,6 +53,17 @@ def test_two_missions_stand_side_by_side_and_the_shorter_one_stops(team):
     assert np.any(halves[0] != halves[1])
     np.testing.assert_array_equal(halves[3], halves[5])
     assert np.any(pictures[3][:240, :230] != pictures[5][:240, :230])
+
+
+@with_opengl
+def test_a_light_video_is_light_and_titles_of_two_stand_above_the_ground(team):
+    with Movie([team, team], replace(STYLE, theme="light")) as movie:
+        picture = movie.picture([29, 29]).astype(int)
+    assert np.median(picture) > 220
+    is_coloured = np.ptp(picture, axis=2) > 40
+    top = drawing.title_height(team, 10)
+    assert not np.any(is_coloured[:top, 250:370])
+    assert np.any(is_coloured[top:230])
 
 
 @with_opengl
