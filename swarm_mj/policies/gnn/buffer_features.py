@@ -73,7 +73,7 @@ class OwnBuffer(NamedTuple):
 
 
 class Staleness(NamedTuple):
-    """Of each teammate of one robot."""
+    """How stale each teammate of one robot is, and how near."""
 
     since: Float[np.ndarray, "N"]  # T, of oneself the last packet; inf if never heard of [windows]
     ranges: Float[np.ndarray, "N"]  # how far off it is, if it is staler, else inf [ranges]
