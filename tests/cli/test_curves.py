@@ -104,7 +104,7 @@ def test_lines_bands_and_levels_stand_where_they_should():
     corners = {tuple(corner) for corner in band.get_paths()[0].vertices}
     assert corners >= {(100.0, 20.0), (100.0, 30.0)}
     labels = [text.get_text() for text in axes.get_legend().get_texts()]
-    assert labels == [r"mine \$", "TDMA 26.2"]
+    assert labels == [r"mine \$", "tdma 26.2"]
     (caption,) = figure.findobj(lambda artist: artist.get_gid() == CAPTION)
     assert caption.get_text() == "an origin"
     plt.close(figure)

@@ -193,7 +193,7 @@ def test_a_chart_is_drawn_by_its_ending_beside_the_table(succeed, refusal, tmp_p
     assert done.stdout.endswith("Wrote a.svg\n")
     assert "round-robin" in done.stdout
     drawn = (tmp_path / "a.svg").read_text()
-    for said in ("random-walk, preset paper: 5 robots", "fading rayleigh", "round robin"):
+    for said in ("random-walk, preset paper: 5 robots", "fading rayleigh", "round-robin"):
         assert f"<!-- {said}" in drawn or said in drawn
     assert "a.svg exists" in refusal("evaluate", *two, "--plot", "a.svg")
     succeed("evaluate", *two, "--plot", "a.PNG")
