@@ -178,8 +178,8 @@ class _Watch(NamedTuple):
         if self.window_s == 0.0:
             return
         until_s = start_s + num_windows * self.window_s
-        while not is_interrupted() and time.monotonic() < until_s:
-            time.sleep(min(LONGEST_SLEEP_S, max(0.0, until_s - time.monotonic())))
+        while not is_interrupted() and time.perf_counter() < until_s:
+            time.sleep(min(LONGEST_SLEEP_S, max(0.0, until_s - time.perf_counter())))
 
     def shortage(self, mission: Mission, num_windows: int) -> str | None:
         """Return a message if it is time to look at the memory, and it is short."""
@@ -214,7 +214,7 @@ def _fly_windows(
     # Unless it ends otherwise, below.
     code = FAILED
     ending = "Out of memory"
-    start_s = time.monotonic()
+    start_s = time.perf_counter()
     with suppress(MemoryError), memory_errors(), deferred_interrupt() as is_interrupted, watch.bar:
         for window in rollout(swarm):
             watch.see(window)

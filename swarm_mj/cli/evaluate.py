@@ -83,7 +83,8 @@ class EvaluateOptions(StudyFlags, PolicyOptions):
     missions: tuple[Mission, ...] = several_missions()
     live: str | None = live_option(
         help="first show the first policy's first mission while it flies, in rerun's viewer or, "
-        "with web, in a browser; it stays open until you close it"
+        "with web, in a browser; it stays open until you close it",
+        is_common=False,
     )
     speed: float | None = speed_option()
 

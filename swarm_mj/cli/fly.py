@@ -3,7 +3,7 @@
 import math
 import os
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass, replace
 from datetime import datetime
@@ -78,27 +78,31 @@ def run(options: FlyOptions) -> int:
     check_live(options.live, options.speed)
     _check_memory(options, path)
     console = Console(stderr=True, highlight=False)
-    if options.policy != asked:
-        console.print(registry.FLOWN_AS)
-    for note in notes_on(mission):
-        console.print(note)
+    flown_as = [registry.FLOWN_AS] if options.policy != asked else []
     if options.live is None:
-        return _fly(options, path, console)
+        return _fly(options, path, console, flown_as)
     with open_viewer(options.live, console) as viewer:
         name = path.stem if path else "live"
         live = LiveFlight(viewer, name, has_file=path is not None, speed=options.speed)
-        code = _fly(options, path, console, live)
+        code = _fly(options, path, console, flown_as, live)
         return viewer.wait() if code == DONE else code
 
 
 def _fly(
-    options: FlyOptions, path: Path | None, console: Console, live: LiveFlight | None = None
+    options: FlyOptions,
+    path: Path | None,
+    console: Console,
+    flown_as: Sequence[str],  # what is to be said of the policy, if it flies as another
+    live: LiveFlight | None = None,
 ) -> int:
     """Fly, write and say what was flown; return the exit code."""
     way_on = None if options.yes else "; --yes flies on all the same"
     flight = _flight(options, is_recorded=path is not None or live is not None)
     shows = live.begin if live else None
     flown = fly_mission(flight, console=console, way_on=way_on, shows=shows)
+    # After the flight: an arena that does not compile is refused there.
+    for note in (*flown_as, *notes_on(options.mission)):
+        console.print(note)
     with deferred_interrupt(), ExitStack() as stack:
         # The stack unwinds in reverse: the replay is written even if the summary fails, and the
         # table is printed in any case.
