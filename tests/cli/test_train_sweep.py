@@ -12,6 +12,8 @@ task = "stationary"
 robots = [4, 5]
 windows = 8
 budget = 64
+rollout-windows = 4
+minibatches = 4
 held-out = 2
 latent = 4
 linear = false
@@ -39,7 +41,8 @@ def test_all_values_are_combined_and_name_their_runs(sweep):
         "seed-2_learning-rate-0.001",
         "seed-2_learning-rate-0.01",
     ]
-    shared = "--task stationary --robots 4 5 --windows 8 --budget 64 --held-out 2 --latent 4"
+    shared = "--task stationary --robots 4 5 --windows 8 --budget 64"
+    shared += " --rollout-windows 4 --minibatches 4 --held-out 2 --latent 4"
     assert trainings["seed-2_learning-rate-0.01"] == [
         *shared.split(),
         *["--seed", "2", "--learning-rate", "0.01"],

@@ -163,8 +163,8 @@ def test_a_curve_is_read_by_the_names_of_its_columns_and_empty_cells_are_left_ou
     path = tmp_path / "curve.csv"
     path.write_text("decisions,aoi,aoi_sem,aoi_tdma,train/entropy\n0,60,4,25,\n128,30.5,,,nan\n")
     first, second = read_curve(path)
-    assert first == (0.0, 60.0, 4.0, {"tdma": 25.0})
-    assert second == (128.0, 30.5, None, {})
+    assert first == (0.0, 60.0, 4.0, {"tdma": 25.0}, {})
+    assert second == (128.0, 30.5, None, {}, {})
 
 
 @pytest.mark.parametrize("text", ["a,b\n1,2\n", "decisions,aoi\n0,x\n", "decisions,aoi\n0,\n"])

@@ -61,15 +61,15 @@ def test_missions_that_choose_are_a_share_of_the_run():
 
 
 def test_minutes_are_reserved_for_every_flight_of_the_end_but_never_most_of_them():
-    """The last evaluation, 4 finalists, 4 others: of 2 missions at first, as an evaluation has."""
+    """The last evaluation, 4 finalists, 5 others: of 2 missions at first, as an evaluation has."""
 
     def reserved(decisions, evaluation, limit):
         progress = Progress(decisions=decisions, evaluation_minutes=evaluation)
         return reserved_minutes(small_training(), progress, limit)
 
-    assert reserved(0, 0.5, 60.0) == pytest.approx(0.5 + 8 * 0.5)
-    # Half of 3200 decisions over 8 flights of 20 windows are 10 missions, 5 times as many.
-    assert reserved(3200, 0.5, 60.0) == pytest.approx(0.5 + 8 * 2.5)
+    assert reserved(0, 0.5, 60.0) == pytest.approx(0.5 + 9 * 0.5)
+    # Half of 3200 decisions over 9 flights of 20 windows are 8 missions, 4 times as many.
+    assert reserved(3200, 0.5, 60.0) == pytest.approx(0.5 + 9 * 2.0)
     assert reserved(3200, 0.5, 2.0) == 1.0
     assert reserved(0, 0.0, 2.0) == 0.0
 
