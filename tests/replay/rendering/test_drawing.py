@@ -17,6 +17,7 @@ from swarm_mj.replay.rendering.drawing import (
     draw_shortfalls,
     draw_title,
 )
+from swarm_mj.replay.rendering.theme import DARK
 
 BOX = Box(20, 10, 380, 150)
 
@@ -83,7 +84,7 @@ def test_links_too_weak_and_robots_cut_off_are_named_and_counted_if_there_are_an
         title = drawn(draw_title, seen, 0, TOP, 12, (0, 255, 0))
         found.append([*named, bool(np.any(has(title, palette.TOO_WEAK, 20)))])
         is_red = has(
-            drawn(AgePlot([seen], BOX, 10).draw_axes), palette.dim(palette.CUT_OFF, SHADE), 0
+            drawn(AgePlot([seen], BOX, 10).draw_axes), DARK.mixed(palette.CUT_OFF, SHADE), 0
         )
         heights.append(np.sum(np.any(is_red, axis=1)))
     assert found == [[False] * 4, [True, True, False, True]]
