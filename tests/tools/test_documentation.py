@@ -77,8 +77,8 @@ def test_every_page_loads_files_of_the_site_only(built):
 
 
 @pytest.mark.slow
-def test_the_home_has_three_cards_and_the_overview_is_the_readme(built):
-    assert (built / "index.html").read_text(encoding="utf-8").count('class="card"') == 3
+def test_the_home_has_four_cards_and_the_overview_is_the_readme(built):
+    assert (built / "index.html").read_text(encoding="utf-8").count('class="card"') == 4
     home = (built / "overview.html").read_text(encoding="utf-8")
     assert (ROOT / "README.md").read_text(encoding="utf-8").startswith("# swarm_mj")
     assert "age of information" in home
