@@ -249,10 +249,7 @@ def _heard_share(swarm: Swarm) -> float:
 def _num_strayed(swarm: Swarm) -> int:
     """Return how many active robots have no other within the mission's range."""
     states = swarm.states
-    is_active = states.is_active
-    if is_active is None:
-        is_active = np.ones(states.position_m.shape[:2], dtype=np.bool_)
-    return int(count_strayed(states.position_m, swarm.mission.range_m, is_active)[0])
+    return int(count_strayed(states.position_m, swarm.mission.range_m, states.is_active)[0])
 
 
 def _shortage(mission: Mission, num_windows: int, recorder: Recorder) -> str | None:

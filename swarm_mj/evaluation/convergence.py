@@ -226,6 +226,7 @@ def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergenc
     [(mission, policy)] = study.pairs
     cost = _checked_cost(study, mission, goal)
     _check_time(mission, goal)
+    config = study.config(policy, mission) | {"version": version(), "commit": commit()}
     flights = [ConvergenceBatch(batch=batch, below=goal.below) for batch in study.batches]
     early: dict[int, np.ndarray] = {}  # done before others of lower seeds
     in_order: list[np.ndarray] = []
@@ -237,8 +238,7 @@ def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergenc
                 found = Convergence(
                     mission=mission,
                     policy=policy,
-                    config=study.config(policy, mission)
-                    | {"version": version(), "commit": commit()},
+                    config=config,
                     goal=goal,
                     cost=cost,
                     seed=study.seed,

@@ -46,18 +46,24 @@ def gather_connected(
 
 @compiled()
 def count_strayed(
-    position_m: Float[np.ndarray, "B N 2"], range_m: float, is_active: Bool[np.ndarray, "B N"]
+    position_m: Float[np.ndarray, "B N 2"],
+    range_m: float,
+    is_active: Bool[np.ndarray, "B N"] | None,
 ) -> Float[np.ndarray, "B"]:
-    """Return how many active robots of each mission have no other active one within `range_m`."""
+    """Return how many active robots of each mission have no other active one within `range_m`.
+
+    None for `is_active` is all robots.
+    """
     num_missions, num_robots = position_m.shape[:2]
     strayed = np.zeros(num_missions)
     for b in range(num_missions):
         for i in range(num_robots):
-            if not is_active[b, i]:
+            if is_active is not None and not is_active[b, i]:
                 continue
             has_neighbour = False
             for j in range(num_robots):
-                if j != i and is_active[b, j]:
+                counts = is_active is None or is_active[b, j]
+                if counts and j != i:
                     apart_m2 = squared_distance(position_m[b], i, j)
                     has_neighbour |= apart_m2 <= range_m * range_m
             strayed[b] += not has_neighbour

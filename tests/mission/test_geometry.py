@@ -81,6 +81,7 @@ def test_robots_with_nobody_in_range_have_strayed():
     everyone = np.ones((1, 4), dtype=np.bool_)
     assert count_strayed(position_m, 12.0, everyone) == [2.0]
     assert count_strayed(position_m, 15.0, everyone) == [1.0]  # at the range is within it
+    assert count_strayed(position_m, 15.0, None) == [1.0]
     without_first = np.array([[False, True, True, True]])
     assert count_strayed(position_m, 12.0, without_first) == [3.0]
     alone = np.array([[False, False, False, True]])
