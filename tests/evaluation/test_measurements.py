@@ -137,7 +137,7 @@ FLOCKS = paper("flocking", num_windows=4)
 def test_how_flocks_agree_is_measured_over_missions_that_did_not_too():
     windows = [3.0, math.nan, 2.0]
     own = costs(
-        [0.0] * 3, agreed_window=windows, decay_rate=[0.1, math.nan, 0.2], strayed=[0, 2, 1]
+        [0.0] * 3, agreed_window=windows, decay_rate=[0.1, math.nan, 0.2], strayed=[0.0, 2.0, 1.0]
     )
     found = measured(own, mission=FLOCKS)
     assert found.agreed_window_median == 3.0
