@@ -1,4 +1,4 @@
-"""Flights that are shown while they go on, as `fly` and `evaluate` share it."""
+"""What is shown while it goes on, as `fly`, `evaluate` and `train` share it."""
 
 import atexit
 from collections.abc import Iterator, Mapping
@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # rerun is slow to import
     from swarm_mj.replay.live import LiveReplay
 
 WHERE = (view.WINDOW, view.WEB)
-ANYHOW = "fly without one: leave out --live"
+ANYHOW = "do without one: leave out --live"
 AS_FAST_AS_IT_GOES = "max"
 _kept_open = ExitStack()  # viewers of flights from Python, which stay when `fly` returns
 atexit.register(_kept_open.close)
@@ -53,7 +53,7 @@ speed_option = partial(
 
 
 def check_live(where: str | None, speed: float | None) -> None:
-    """Raise ValueError or ModuleNotFoundError if a flight cannot be shown so."""
+    """Raise ValueError or ModuleNotFoundError if nothing can be shown so."""
     if where is None:
         if speed is not None:
             raise ValueError(f"--speed {speed:g} is of live flights; add --live")

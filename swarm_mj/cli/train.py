@@ -1,12 +1,15 @@
 """`swarm-mj train`: trains a communication policy by PPO in simulated missions."""
 
 import shlex
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import ClassVar, get_args
 
 from rich.console import Console
 
+from swarm_mj.api.live import check_live, live_option, open_viewer
 from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import Given, nested
@@ -25,6 +28,8 @@ from swarm_mj.system.terminal import named_values, plain_console, tell_cores, th
 from swarm_mj.system.user_code import files_named
 from swarm_mj.system.writing import Output, check_outputs
 
+ONE_LIVE = "--live shows one training; leave it out of a --sweep"
+
 
 @dataclass(frozen=True, kw_only=True)
 class TrainOptions(EngineOptions):
@@ -42,6 +47,12 @@ class TrainOptions(EngineOptions):
     minutes: float | None = same_as(Limits, "minutes")
     patience: int | None = same_as(Limits, "patience")
     replay_every: int | None = same_as(Limits, "replay_every")
+    live: str | None = live_option(
+        help="show the first held-out mission of each evaluation and the learning curve meanwhile, "
+        "in rerun's viewer or, with web, in a browser",
+        group="",
+        is_common=False,
+    )
     device: str | None = setting(
         None,
         "where the networks learn: cpu, or cuda, an NVIDIA GPU; auto takes a GPU if there is one. "
@@ -73,31 +84,48 @@ class TrainOptions(EngineOptions):
 def run(options: TrainOptions) -> int:
     """Run the command; return its exit code."""
     if options.sweep is not None:
+        if options.live is not None:
+            raise ValueError(ONE_LIVE)
         return _sweep(options, options.sweep)
     if (options.jobs, options.engine, options.address) != (1, "local", None):
         raise ValueError(
             "--jobs, --engine and --address are of several trainings; add --sweep FILE"
         )
+    check_live(options.live, None)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     with console.status("Preparing ..."):
         asked = asked_run(options)
         tell_cores(asked.training.threads, "threads")
+        from swarm_mj.learning.live import LiveTraining
         from swarm_mj.learning.loggers import make_logger
         from swarm_mj.learning.train import train  # stable-baselines3 is slow to import
 
-        logger = make_logger(options.logger, options.out) if options.logger else None
+        trains = partial(
+            train,
+            asked,
+            options.out,
+            is_resumed=options.resume,
+            logger=make_logger(options.logger, options.out) if options.logger else None,
+            complain=console.print,
+        )
+    if options.live is None:
+        return _train(options, asked, console, trains)
+    with open_viewer(options.live, console) as viewer:
+        code = _train(options, asked, console, partial(trains, live=LiveTraining(viewer)))
+        if code == DONE:
+            viewer.wait()  # whether it failed or was closed, the run has not
+        return code
+
+
+def _train(
+    options: TrainOptions, asked: TrainingRun, console: Console, trains: Callable[..., Progress]
+) -> int:
+    """Train, and say what came of it; return the exit code."""
     try:
         with memory_errors(), deferred_interrupt() as is_interrupted:
             watch = Watch(console, asked, is_interrupted)
             with watch:
-                progress = train(
-                    asked,
-                    options.out,
-                    listener=watch,
-                    is_resumed=options.resume,
-                    logger=logger,
-                    complain=console.print,
-                )
+                progress = trains(listener=watch)
             _print(options.out, asked, progress, is_over=not watch.has_stopped)
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
@@ -148,7 +176,8 @@ def asked_run(options: TrainOptions) -> TrainingRun:
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
     written = (Output("run", options.out / name) for name in names)
     check_outputs(*written, inputs=[*files_read(options), *files_read(run.training)])
-    needs = run_folder.training_needs(run.training, run.limits)
+    is_shown = options.live is not None
+    needs = run_folder.training_needs(run.training, run.limits, is_shown=is_shown)
     check_fits(needs, options.out, "choose fewer --missions or --robots", is_forced=options.yes)
     return run
 

@@ -107,7 +107,7 @@ def run_sweep(path: Path, out: Path, engine: Engine, *, is_resumed: bool) -> int
         ValueError: An option in the file is unknown, or cannot be trained with.
         OSError: A file cannot be read or written, or the engine could not do all.
     """
-    from swarm_mj.cli.train import asked_run
+    from swarm_mj.cli.train import ONE_LIVE, asked_run
 
     commands: list[list[str]] = []
     for name, options in read_sweep(path).items():
@@ -115,6 +115,8 @@ def run_sweep(path: Path, out: Path, engine: Engine, *, is_resumed: bool) -> int
         has_begun = is_resumed and (folder / SETTINGS).exists()
         command = ["train", *options, "--out", str(folder), *(["--resume"] if has_begun else [])]
         _, asked = parse(command)
+        if asked.live is not None:
+            raise ValueError(f"sweep {path}: {ONE_LIVE}")
         asked_run(asked)  # whatever is wrong is said before anything is trained
         commands.append(command)
     # A training that is done in this process takes the standard streams for itself.

@@ -202,16 +202,28 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
     }
 
 
-def record_replay(training: Training, network: Network, decisions: int, folder: Path) -> None:
-    """Record the first held-out mission, as the network flies it after this many team decisions."""
-    from swarm_mj.replay.write import write_replay  # rerun is slow to import
-
+def record_first(training: Training, network: Network, on_window: OnWindow) -> Recorder:
+    """Fly the first held-out mission, as evaluations do; return its record."""
     mission = replace(training.mission, num_robots=training.robots[0])
     swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
     recorder = Recorder(swarm)
     for window in rollout(swarm, held_out_policy(training, network, mission)):
         recorder.add(window)
-    about = {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed}
+        on_window(recorder.num_windows / mission.num_windows)
+    return recorder
+
+
+def recorded_of(training: Training, decisions: int) -> dict[str, int]:
+    """Return what such a record is of, after this many team decisions: a replay's properties."""
+    return {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed}
+
+
+def record_replay(training: Training, network: Network, decisions: int, folder: Path) -> None:
+    """Record the first held-out mission, as the network flies it after this many team decisions."""
+    from swarm_mj.replay.write import write_replay  # rerun is slow to import
+
+    recorder = record_first(training, network, lambda _share: None)
+    about = recorded_of(training, decisions)
     write_replay(recorder.log(about), about, folder / f"decisions-{decisions:09d}.rrd")
 
 

@@ -3,9 +3,11 @@
 import warnings
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any, Protocol, runtime_checkable
+from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
 
 from swarm_mj.system.user_code import make
+
+Helper = TypeVar("Helper")
 
 
 @runtime_checkable
@@ -51,34 +53,36 @@ def make_logger(name: str, folder: Path) -> Logger:
     return logger
 
 
-class Guarded:
-    """A logger whose first failure is its last call, and does not end the run."""
+class Guarded(Generic[Helper]):
+    """A helper that a run can do without: its first failure is its last call, and ends no run."""
 
-    def __init__(self, logger: Logger | None, complain: Callable[[str], object] | None) -> None:
-        """Take the logger, if there is one, and who hears of its failure; None warns."""
-        self._logger = logger
+    def __init__(
+        self, helper: Helper | None, what: str, complain: Callable[[str], object] | None
+    ) -> None:
+        """Take a helper, if there is one.
+
+        Args:
+            helper: It does what a run asks of it, and may fail.
+            what: It, in words.
+            complain: It hears of a failure; None warns.
+        """
+        self._helper = helper
+        self._what = what
         self._complain = complain or warnings.warn
 
-    def start(self, settings: Mapping[str, Any], folder: Path) -> None:
-        """Call `Logger.start`."""
-        self._do(lambda logger: logger.start(settings, folder))
+    @property
+    def is_there(self) -> bool:
+        """True if there is one, and it has not failed."""
+        return self._helper is not None
 
-    def log(self, row: Mapping[str, float], decisions: int) -> None:
-        """Call `Logger.log`."""
-        self._do(lambda logger: logger.log(row, decisions))
-
-    def finish(self) -> None:
-        """Call `Logger.finish`."""
-        self._do(lambda logger: logger.finish())
-
-    def _do(self, call: Callable[[Logger], None]) -> None:
-        logger = self._logger
-        if logger is None:
+    def do(self, call: Callable[[Helper], object]) -> None:
+        """Make a call of the helper, if it is there."""
+        helper = self._helper
+        if helper is None:
             return
         try:
-            call(logger)
+            call(helper)
         except (Exception, SystemExit) as error:
-            self._logger = None  # what failed once is left alone
+            self._helper = None  # what failed once is left alone
             said = " ".join(f"{type(error).__name__}: {error}".split())[:300]
-            name = type(logger).__name__
-            self._complain(f"The logger {name} failed ({said}); the run goes on without it.")
+            self._complain(f"The {self._what} failed ({said}); the run goes on without it.")

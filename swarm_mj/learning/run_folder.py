@@ -189,8 +189,11 @@ def check_begun(folder: Path) -> None:
         )
 
 
-def training_needs(training: Training, limits: Limits) -> needs.Needs:
-    """Estimate a run: a rollout and the passes over it, held-out missions, checkpoints, replays."""
+def training_needs(training: Training, limits: Limits, *, is_shown: bool = False) -> needs.Needs:
+    """Estimate a run: a rollout and the passes over it, held-out missions, checkpoints, replays.
+
+    One that is shown while it goes on records a mission at a time, as replays do.
+    """
     first = replace(training.mission, num_robots=training.robots[0])  # of the replays
     size = max(training.robots)
     rollout = rollout_bytes(training)
@@ -202,13 +205,12 @@ def training_needs(training: Training, limits: Limits) -> needs.Needs:
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - LIBRARIES - TORCH) + passes
     file = WINDOW_BYTES * training.missions * size * training.num_windows + CHECKPOINT_BYTES
-    if limits.replay_every is None:
-        return needs.Needs(memory=memory, file=file)
-    num_replays = 1 + (limits.decisions or 0) // limits.replay_every
-    return needs.Needs(
-        memory=memory + IN_MEMORY.of(first, first.num_windows),
-        file=file + num_replays * ON_DISK.of(first, first.num_windows),
-    )
+    if is_shown or limits.replay_every is not None:
+        memory += IN_MEMORY.of(first, first.num_windows)
+    if limits.replay_every is not None:
+        num_replays = 1 + (limits.decisions or 0) // limits.replay_every
+        file += num_replays * ON_DISK.of(first, first.num_windows)
+    return needs.Needs(memory=memory, file=file)
 
 
 def rollout_bytes(training: Training) -> int:

@@ -14,6 +14,7 @@ from stable_baselines3.common.logger import configure
 
 from swarm_mj.learning import checkpoint, held_out, run_folder, selection
 from swarm_mj.learning.graph_vec_env import env_of
+from swarm_mj.learning.live import LiveTraining
 from swarm_mj.learning.loggers import Guarded, Logger
 from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, CURVE, INIT, REPLAYS, SETTINGS, TrainingRun
@@ -44,6 +45,7 @@ def train(
     listener: Listener,
     is_resumed: bool = False,
     logger: Logger | None = None,
+    live: LiveTraining | None = None,
     complain: Callable[[str], object] | None = None,
 ) -> Progress:
     """Train until a limit, or until the listener returns False.
@@ -57,6 +59,8 @@ def train(
             starts over.
         logger: It gets the settings and every evaluation of this session, and does not end the run
             if it fails.
+        live: It shows every evaluation of this session in a viewer, and likewise does not end the
+            run if it fails. The policies are the same with and without it.
         complain: It hears of such a failure; by default it is a warning.
 
     Returns:
@@ -76,15 +80,16 @@ def train(
     check_folder(folder)
     with owned(folder / SETTINGS):
         check_folder(folder)  # a run may have begun, or come further, meanwhile
-        guarded = Guarded(logger, complain)
-        session = TrainingSession(run, folder, listener, guarded)
-        guarded.start(asdict(run), folder)
+        guarded = Guarded(logger, f"logger {type(logger).__name__}", complain)
+        shown = Guarded(live, "viewer", complain)
+        session = TrainingSession(run, folder, listener, guarded, shown)
+        guarded.do(lambda logger: logger.start(asdict(run), folder))
         try:
             session.learn()
             session.choose()
         finally:
             session.ppo.logger.close()
-            guarded.finish()
+            guarded.do(lambda logger: logger.finish())
     return session.progress
 
 
@@ -95,7 +100,14 @@ class Stopped(Exception):  # noqa: N818 - nothing went wrong
 class TrainingSession(BaseCallback):
     """One session of a run; PPO calls it after every window of a rollout."""
 
-    def __init__(self, run: TrainingRun, folder: Path, listener: Listener, logger: Guarded) -> None:
+    def __init__(
+        self,
+        run: TrainingRun,
+        folder: Path,
+        listener: Listener,
+        logger: Guarded[Logger],
+        live: Guarded[LiveTraining],
+    ) -> None:
         """Take a run to its last checkpoint, or else to its beginning; then it can be resumed."""
         super().__init__()
         self._run = run
@@ -103,6 +115,7 @@ class TrainingSession(BaseCallback):
         self._folder = folder
         self._listener = listener
         self._own_logger = logger
+        self._live = live
         self.ppo = make_model(run.training, run.device)
         self._env = env_of(self.ppo)
         self._aoi = math.nan
@@ -141,6 +154,8 @@ class TrainingSession(BaseCallback):
         progress = self.progress
         patience = self._run.limits.patience
         model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
+        if progress.curve:  # what the run that is resumed has come to, if only to look at it
+            self._show(lambda _share: None)
         # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
         while True:
             self._count_time()
@@ -265,7 +280,7 @@ class TrainingSession(BaseCallback):
         for name, value in evaluation.columns().items():
             self.logger.record(name if "/" in name else f"held_out/{name}", value)
         self.logger.dump(decisions)
-        self._own_logger.log(evaluation.columns(), decisions)
+        self._own_logger.do(lambda logger: logger.log(evaluation.columns(), decisions))
         progress.write_curve(self._folder / CURVE)
         self._networks[decisions] = network
         kept = {row.decisions for row in selection.candidates(progress.curve)}
@@ -275,6 +290,26 @@ class TrainingSession(BaseCallback):
             progress.choice = None
             self._keep(decisions, costs, None)
         self._report()
+        self._show(partial(self._report, "Showing"))
+
+    def _show(self, on_window: held_out.OnWindow) -> None:
+        """Show how the policy under training flies, and the curve, if there is a viewer."""
+        if not self._live.is_there:
+            return
+        progress = self.progress
+        network = policy_of(self.ppo).acting_network()
+        self._count_time()
+        # Showing is no part of the time that decisions take.
+        seconds = progress.since_evaluation.seconds
+        try:
+            flown = held_out.record_first(self._training, network, on_window)
+        except Stopped:
+            return
+        self._live.do(
+            lambda live: live.show(self._training, flown, progress.decisions, progress.curve)
+        )
+        self._count_time()
+        progress.since_evaluation.seconds = seconds
 
     def choose(self) -> None:
         """Choose the policy that is kept, once nothing is left to train and if none is chosen."""

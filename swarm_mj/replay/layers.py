@@ -79,7 +79,7 @@ SCENE_HEADINGS = Lines3D(path="scene/heading", colour=palette.HEADING, width=0.8
 SCENE_UNBELIEVED = Lines3D(path="scene/world/unbelieved", colour=None, width=0.6)
 SCENE_TOO_WEAK = Lines3D(path="scene/world/too_weak", colour=None, width=0.5)
 
-# The charts, the legend, and a sheet of text.
+# The charts, and the legend.
 AGE_PLOT = View(path="plots/age")
 PACKET_PLOT = View(path="plots/radio")
 LINK_PLOT = View(path="plots/world")
@@ -88,6 +88,19 @@ AGREED = COST_PLOT.below("agreed")
 MEAN_AGE = AGE_PLOT.below("mean")
 WORST_AGE = AGE_PLOT.below("worst")
 LEGEND = View(path="legend")
+
+# The learning curve of a training, beside the mission of its newest policy.
+LEARNING = View(path="learning")
+LEARNING_GRID = Lines(path="learning/grid", colour=palette.OUTLINE, width=0.5, order=0.0)
+LEARNING_REFERENCES = Lines(path="learning/references", colour=None, width=0.8, order=1.0)
+LEARNING_ERRORS = Lines(
+    path="learning/errors", colour=palette.dim(palette.LEARNED, 0.6), width=0.8, order=2.0
+)
+LEARNING_CURVE = Lines(path="learning/curve", colour=palette.LEARNED, width=1.0, order=3.0)
+LEARNING_POINTS = Points(path="learning/points", colour=palette.LEARNED, width=2.5, order=4.0)
+LEARNING_NEWEST = Points(path="learning/newest", colour=palette.TEXT, width=4.0, order=5.0)
+
+# A sheet of text.
 ABOUT = Entity(path="about")
 
 # Whom each robot addressed and decoded in both slots; no view shows it, exports read it.

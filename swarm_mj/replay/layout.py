@@ -20,8 +20,10 @@ from swarm_mj.replay.plots import Plot, plots
 from swarm_mj.replay.replay_size import in_matrix
 from swarm_mj.replay.rerun_log import TIMELINE, RerunLog
 from swarm_mj.replay.stage import square_m
+from swarm_mj.replay.training_curve import X_RANGE, Y_RANGE, TrainingCurve
 
 WINDOWS_PER_SECOND = 30.0  # windows of 100 ms: three times as fast as the mission
+SCENE = "Scene in 3-D, colours as on the map"
 MARGIN = 1.06  # of the map, around what it must show
 
 WIDTH = 100.0  # of the legend's view, in units of its own, y down
@@ -53,11 +55,22 @@ class Layout(rrb.Blueprint):
         del self._stream
 
 
-def layout(out: RerunLog, *, is_live: bool = False, live_fps: float | None = None) -> Layout:
+def layout(
+    out: RerunLog,
+    *,
+    is_live: bool = False,
+    live_fps: float | None = None,
+    curve: TrainingCurve | None = None,
+) -> Layout:
     """Return the blueprint: tabs of the mission, its scene, and the radio of every robot.
 
-    A live one is for a flight that goes on: the plots' axes grow with it, and the viewer shows what
-    came last, or plays `live_fps` windows a second.
+    Args:
+        out: What was drawn.
+        is_live: Whether more will be drawn: the plots' axes grow with it, and the viewer shows what
+            came last.
+        live_fps: Windows a second that the viewer plays of such a flight instead.
+        curve: Of a training: a tab more, in front, has it beside the mission, which the viewer
+            plays again and again.
     """
     mission = rrb.Horizontal(
         _left(out, is_live=is_live),
@@ -65,12 +78,18 @@ def layout(out: RerunLog, *, is_live: bool = False, live_fps: float | None = Non
         column_shares=[11, 10],
         name="Mission",
     )
-    scene = _scene(out.drawn.ground.reach_m)
-    tabs = rrb.Tabs(mission, scene, _radio(out.log), active_tab=0)
+    shown = [mission, _scene(out, SCENE), _radio(out.log)]
+    if curve is not None:
+        shown.insert(0, _training(out, curve, is_live=is_live))
+    tabs = rrb.Tabs(*shown, active_tab=0)
     panel = rrb.TimePanel(
-        state="collapsed", timeline=TIMELINE, fps=WINDOWS_PER_SECOND, loop_mode="all"
+        state="collapsed",
+        timeline=TIMELINE,
+        fps=WINDOWS_PER_SECOND,
+        play_state=None if curve is None else "playing",
+        loop_mode="all",
     )
-    if is_live:
+    if is_live and curve is None:
         panel = rrb.TimePanel(
             state="collapsed",
             timeline=TIMELINE,
@@ -91,12 +110,37 @@ def _left(out: RerunLog, *, is_live: bool) -> rrb.Vertical:
     map_view = _drawing(
         "/", name, across, across, contents=layers.ARENA.contents, hidden=layers.LINKS.values()
     )
+    return _above_legend(out, map_view, is_live=is_live)
+
+
+def _above_legend(
+    out: RerunLog, view: rrb.Spatial2DView | rrb.Spatial3DView, *, is_live: bool
+) -> rrb.Vertical:
+    """Return a view above the map's legend."""
     num_rows = MOST_ROWS if is_live and out.log.is_compared else len(legend_rows(out))
     height = legend_height(out.log, num_rows)
     samples = _drawing(
         f"/{layers.LEGEND.path}", "Legend", (0.0, WIDTH), (-3.5, height), titlebar=False
     )
-    return rrb.Vertical(map_view, samples, row_shares=[4, height / (ROW + LAST)])
+    return rrb.Vertical(view, samples, row_shares=[4, height / (ROW + LAST)])
+
+
+def _training(out: RerunLog, curve: TrainingCurve, *, is_live: bool) -> rrb.Horizontal:
+    """Return the mission in 3-D beside the learning curve, and the mission's ages below that."""
+    learned = _drawing(
+        f"/{layers.LEARNING.path}",
+        f"Learning curve: {curve.title} over team decisions",
+        X_RANGE,
+        Y_RANGE,
+    )
+    age, *_ = plots(out.log)
+    scene = _scene(out, "First held-out mission, as the newest policy flies it")
+    return rrb.Horizontal(
+        _above_legend(out, scene, is_live=is_live),
+        rrb.Vertical(learned, _plot(age, None), row_shares=[5, 3]),
+        column_shares=[1, 1],
+        name="Training",
+    )
 
 
 def _right(out: RerunLog, *, is_live: bool) -> rrb.Vertical:
@@ -143,12 +187,13 @@ def _without_others(links: Iterable[Lines | Lines3D]) -> Overrides:
     return hidden
 
 
-def _scene(reach_m: float) -> rrb.Spatial3DView:
+def _scene(out: RerunLog, name: str) -> rrb.Spatial3DView:
+    reach_m = out.drawn.ground.reach_m
     return rrb.Spatial3DView(
         origin="/",
         contents=[layers.SCENE.contents],
         overrides=_without_others(layers.SCENE_LINKS.values()),
-        name="Scene in 3-D, colours as on the map",
+        name=name,
         background=palette.BACKGROUND,
         line_grid=False,
         eye_controls=rrb.EyeControls3D(

@@ -22,6 +22,7 @@ from swarm_mj.replay.read import with_digest
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import draw_stage, grid
+from swarm_mj.replay.training_curve import TrainingCurve, draw_training_curve
 from swarm_mj.replay.write import (
     draw_growing,
     draw_piece,
@@ -61,6 +62,8 @@ class LiveReplay:
         *,
         has_file: bool = False,
         windows_per_second: float | None = None,
+        curve: TrainingCurve | None = None,
+        has_layout: bool = True,
     ) -> None:
         """Prepare to show a flight.
 
@@ -71,6 +74,9 @@ class LiveReplay:
             address: Where the viewer takes data, as rerun names it.
             has_file: Whether it will be written to a file.
             windows_per_second: That the viewer plays; None shows the latest window.
+            curve: Of the training whose policy flies, which is shown beside the mission.
+            has_layout: Whether to send the layout; without it, the viewer keeps that of the last
+                flight of the same kind, and whatever its user has changed.
         """
         self._recorder = recorder
         self._config = {key: value for key, value in config.items() if value is not None}
@@ -78,6 +84,8 @@ class LiveReplay:
         self._address = address
         self._has_file = has_file
         self._windows_per_second = windows_per_second
+        self._curve = curve
+        self._has_layout = has_layout
         self._next_s = 0.0
         self._num_drawn = 0  # windows
         self._out: RerunLog | None = None
@@ -119,7 +127,7 @@ class LiveReplay:
         """Return what draws, once the first piece says what kind of flight it is."""
         file = new_recording(piece) if self._has_file else None
         content = file.binary_stream() if file else None
-        viewer = new_recording(piece)
+        viewer = new_recording(piece, self._curve)
         viewer.connect_grpc(self._address)
         self._recordings = _Recordings(file=file, content=content, viewer=viewer)
         for recording in self._recordings.all:
@@ -130,7 +138,12 @@ class LiveReplay:
         with out.only_to(viewer):
             draw_stage(out)
             draw_legend(out)
-        send_layout(viewer, out, live_fps=self._windows_per_second, is_live=True)
+            if self._curve is not None:
+                draw_training_curve(out, self._curve)
+        if self._has_layout:
+            send_layout(
+                viewer, out, live_fps=self._windows_per_second, is_live=True, curve=self._curve
+            )
         return out
 
     def finish(self) -> None:
@@ -148,6 +161,12 @@ class LiveReplay:
             send_layout(self._recordings.file, out)
         with suppress(RuntimeError):  # the viewer was closed
             self._recordings.viewer.flush(timeout_sec=FLUSH_S)
+
+    def close(self) -> None:
+        """Let go of the viewer, which keeps what it was sent; nothing more can be shown."""
+        if self._recordings is not None:
+            self._recordings.viewer.disconnect()
+            bindings.flush_and_cleanup_orphaned_recordings()  # its threads, which would stay
 
     def save(self, path: Path) -> None:
         """Write the finished replay to its file, whole or not at all; or raise OSError."""

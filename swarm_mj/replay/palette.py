@@ -68,6 +68,8 @@ MEAN_AGE: Colour = (53, 183, 121)
 WORST_AGE: Colour = (150, 158, 172)
 VARIANCE: Colour = (240, 200, 80)
 AGREED: Colour = (255, 255, 255)
+LEARNED: Colour = MEAN_AGE  # by the policy in training
+REFERENCES: tuple[Colour, ...] = (VARIANCE, (86, 180, 233), (204, 121, 167), (196, 203, 214))
 # The mean age in videos, of one flight and of a second: no colours of the ramp, which mean ages.
 FILM_CURVES: tuple[Colour, Colour] = ((255, 255, 255), (255, 120, 190))
 

@@ -25,7 +25,7 @@ NOWHERE = f"http://{LOOPBACK}:9"  # a proxy that is not there
 # With CI set rerun does not count its users; its search for newer versions has no switch.
 REPLACED = ("CI", "FORCE_RERUN_ANALYTICS", "ALL_PROXY", "HTTPS_PROXY", "HTTP_PROXY", "NO_PROXY")
 
-# Where a flight is shown while it goes on.
+# Where a flight or a training is shown while it goes on.
 WINDOW = "window"
 WEB = "web"
 OPENING_S = 60.0  # that a viewer may take to open
@@ -118,7 +118,7 @@ def _await_port(process: subprocess.Popen[bytes], port: int) -> None:
         code = process.poll()
         if code is not None:
             lack = f"rerun's viewer ended as it was opened (exit code {code})"
-            raise OSError(f"{lack}; --live web needs no window, --record a file only")
+            raise OSError(f"{lack}; --live web needs no window, and without --live none opens")
         with suppress(OSError), socket.create_connection((LOOPBACK, port), timeout=1.0):
             return
         time.sleep(0.05)

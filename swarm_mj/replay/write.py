@@ -32,6 +32,7 @@ from swarm_mj.replay.palette import LinkKind
 from swarm_mj.replay.read import FACTS, with_digest
 from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import draw_stage, move_ground
+from swarm_mj.replay.training_curve import TrainingCurve
 from swarm_mj.system.writing import write_bytes
 
 TRAIL_STRIDE = 15
@@ -67,10 +68,11 @@ def _recorded(log: Log, config: Mapping[str, Any], name: str) -> bytes:
     return stream.read() or b""
 
 
-def new_recording(log: Log) -> rr.RecordingStream:
-    """Return a recording of this kind of flight, which goes nowhere yet."""
+def new_recording(log: Log, curve: TrainingCurve | None = None) -> rr.RecordingStream:
+    """Return a recording of this kind of flight, or training, which goes nowhere yet."""
     rr.set_strict_mode(True)  # bad data raises; otherwise a column is silently missing
-    recording = rr.RecordingStream(_application(log), send_properties=False)
+    application = _application(log) if curve is None else f"training - {_application(log)}"
+    recording = rr.RecordingStream(application, send_properties=False)
     recording.set_log_tick_enabled(False)
     recording.set_log_time_enabled(False)
     return recording
@@ -116,10 +118,11 @@ def send_layout(
     *,
     is_live: bool = False,
     live_fps: float | None = None,
+    curve: TrainingCurve | None = None,
 ) -> None:
-    """Send the layout; without one, rerun makes its own."""
+    """Send the layout, as of `layout`; without one, rerun makes its own."""
     try:
-        laid_out = layout(out, is_live=is_live, live_fps=live_fps)
+        laid_out = layout(out, is_live=is_live, live_fps=live_fps, curve=curve)
     except (AttributeError, TypeError) as error:  # rerun calls its views unstable
         lack = f"rerun-sdk {rr.__version__} does not know a part of the layout ({error})"
         warnings.warn(f"{lack}, so the replay has rerun's own", stacklevel=2)
