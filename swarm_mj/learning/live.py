@@ -72,6 +72,7 @@ def training_curve(training: Training, rows: Sequence[CurveRow]) -> "TrainingCur
             references[name] = its
     return TrainingCurve(
         title=cost.label,
+        digits=cost.digits,
         decisions=np.array([float(row.decisions) for row in rows]),
         cost=np.array(costs),
         sem=np.array(sems),

@@ -129,7 +129,7 @@ def _training(out: RerunLog, curve: TrainingCurve, *, is_live: bool) -> rrb.Hori
     """Return the mission in 3-D beside the learning curve, and the mission's ages below that."""
     learned = _drawing(
         f"/{layers.LEARNING.path}",
-        f"Learning curve: {curve.title} over team decisions",
+        f"Learning curve: {curve.title} of held-out missions, over team decisions",
         X_RANGE,
         Y_RANGE,
     )

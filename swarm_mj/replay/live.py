@@ -133,6 +133,10 @@ class LiveReplay:
         for recording in self._recordings.all:
             send_properties(recording, piece, self._config, self._name)
         out = RerunLog(self._recordings.all, piece)
+        if self._has_layout:  # before all else, or a slow viewer would show one of its own first
+            send_layout(
+                viewer, out, live_fps=self._windows_per_second, is_live=True, curve=self._curve
+            )
         self._grid = grid(out.drawn.ground)
         # First: rerun takes the type of "loss_db" from its first use, and obstacles' is no integer.
         with out.only_to(viewer):
@@ -140,10 +144,6 @@ class LiveReplay:
             draw_legend(out)
             if self._curve is not None:
                 draw_training_curve(out, self._curve)
-        if self._has_layout:
-            send_layout(
-                viewer, out, live_fps=self._windows_per_second, is_live=True, curve=self._curve
-            )
         return out
 
     def finish(self) -> None:

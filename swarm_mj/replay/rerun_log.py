@@ -25,7 +25,7 @@ from swarm_mj.replay.layer_kinds import (
 from swarm_mj.replay.links import LinkRows, shades
 from swarm_mj.replay.links import Points as Places
 from swarm_mj.replay.log import Log
-from swarm_mj.replay.palette import Colour, LinkKind
+from swarm_mj.replay.palette import LinkKind
 from swarm_mj.replay.walk import neighbours_together
 
 TIMELINE = "window"
@@ -132,19 +132,10 @@ class RerunLog:
             per_window = np.bincount(row, minlength=num_windows)
         self.timed(entity, columns.partition(per_window))
 
-    def words(
-        self,
-        entity: Entity,
-        texts: list[str],
-        places: Sequence[Point],
-        colours: Sequence[Colour] = (palette.TEXT,),
-    ) -> None:
-        """Write texts that never change at places in 2-D, as labels of points that are not seen.
-
-        A single colour is that of all.
-        """
+    def words(self, entity: Entity, texts: list[str], places: Sequence[Point]) -> None:
+        """Write texts that never change at places in 2-D, as labels of points that are not seen."""
         points = rr.Points2D.from_fields(
-            positions=places, labels=texts, show_labels=True, radii=-0.1, colors=colours
+            positions=places, labels=texts, show_labels=True, radii=-0.1, colors=[palette.TEXT]
         )
         self.fixed(entity, points)
 

@@ -20,9 +20,12 @@ SIZE = (600.0, 330.0)  # of the plot, in units of its own, y down
 # What the view shows: left and below are the numbers of the ticks, to the right the lines' names.
 NAMES = 150.0
 X_RANGE = (-40.0, SIZE[0] + NAMES)
-Y_RANGE = (-20.0, SIZE[1] + 42.0)
+Y_RANGE = (-20.0, SIZE[1] + 46.0)
 TEXT_UP = 10.0  # rerun writes below a point: from there to the middle of a text
-LINE = 20.0  # from the middle of one text to the next
+LINE = 23.0  # from the middle of one text to the next
+LEAD = 14.0  # to the right of the plot: from a line's end to the height of its name
+LETTER = 6.2  # of a name, about, in a window of 1500 pixels; names stand amid their place
+UNDER = 14.0  # from the plot to the numbers below it
 NUM_TICKS = 5  # of decisions, about
 POLICY = "policy in training"
 
@@ -34,6 +37,7 @@ class TrainingCurve:
     title: str  # what is drawn, with its unit
     decisions: Float[np.ndarray, "E"]  # of teams, before each evaluation
     cost: Float[np.ndarray, "E"]  # of the policy in training
+    digits: int  # after the point, of a cost beside its line
     sem: Float[np.ndarray, "E"]  # its standard error; 0 where it is not known
     references: Mapping[str, float]  # costs of policies that do not learn, by their names
 
@@ -121,25 +125,29 @@ def draw_training_curve(out: RerunLog, curve: TrainingCurve) -> None:
     out.fixed(layers.LEARNING_POINTS, layers.LEARNING_POINTS.look(positions=points))
     out.fixed(layers.LEARNING_NEWEST, layers.LEARNING_NEWEST.look(positions=points[-1:]))
 
-    names = [f"{POLICY} {curve.cost[-1]:.3g}"]
+    costs = {POLICY: float(curve.cost[-1])} | dict(curve.references)
+    names = [f"{name} {cost:.{curve.digits}f}" for name, cost in costs.items()]
+    levels = y_of(np.array(list(costs.values()))).tolist()
+    _draw_references(out, names, levels)
+
+
+def _draw_references(out: RerunLog, names: list[str], levels: list[float]) -> None:
+    """Draw a line across for each policy but the first, and lead from all to their names."""
+    width, _ = SIZE
+    places = spread(levels, LINE)
     colours = [palette.LEARNED]
-    heights = [float(y[-1])]
-    levels: list[list[Point]] = []
-    for number, (name, cost) in enumerate(curve.references.items()):
-        level = float(y_of(np.array(cost)))
-        names.append(f"{name} {cost:.3g}")
-        colours.append(palette.REFERENCES[number % len(palette.REFERENCES)])
-        heights.append(level)
-        levels.append([(0.0, level), (width, level)])
-    lines = rr.LineStrips2D.from_fields(
-        strips=levels,
-        colors=colours[1:],
-        radii=layers.LEARNING_REFERENCES.radii,
-        draw_order=layers.LEARNING_REFERENCES.order,
-    )
-    out.fixed(layers.LEARNING_REFERENCES, lines)
-    places = [(width + NAMES / 2.0, at - TEXT_UP) for at in spread(heights, LINE)]
-    out.words(layers.LEARNING.below("names"), names, places, colours)
+    strips: list[list[Point]] = []
+    for number, (level, place) in enumerate(zip(levels, places, strict=True)):
+        beside = width + NAMES / 2.0 - LETTER * len(names[number]) / 2.0
+        to_name = [(width, level), (width + LEAD, place), (max(width + LEAD, beside), place)]
+        if number > 0:
+            to_name.insert(0, (0.0, level))
+            colours.append(palette.REFERENCES[(number - 1) % len(palette.REFERENCES)])
+        strips.append(to_name)
+    layer = layers.LEARNING_REFERENCES
+    out.fixed(layer, layer.look(strips=strips), rr.LineStrips2D.from_fields(colors=colours))
+    at_names = [(width + NAMES / 2.0, place - TEXT_UP) for place in places]
+    out.words(layers.LEARNING.below("names"), names, at_names)
 
 
 def _draw_axes(out: RerunLog, axis: CostAxis, last: float) -> None:
@@ -151,11 +159,10 @@ def _draw_axes(out: RerunLog, axis: CostAxis, last: float) -> None:
     out.fixed(layers.LEARNING_GRID, layers.LEARNING_GRID.look(strips=[*across, *upright]))
     costs = [f"{tick:g}" for tick in axis.ticks]
     places = [(X_RANGE[0] / 2.0, level - TEXT_UP) for level in levels]
-    every = palette.nice_top(last / NUM_TICKS)
-    decisions = np.arange(0.0, last, every)
-    for tick in decisions:
+    every = max(1.0, palette.nice_top(last / NUM_TICKS))
+    for tick in np.arange(0.0, last, every):
         costs.append(f"{tick:,.0f}")
-        places.append((width * tick / last, height + TEXT_UP / 2.0))
+        places.append((width * tick / last, height + UNDER))
     costs.append("team decisions")
-    places.append((width + NAMES / 2.0, height + TEXT_UP / 2.0))
+    places.append((width + NAMES / 2.0, height + UNDER))
     out.words(layers.LEARNING.below("ticks"), costs, places)

@@ -1,22 +1,27 @@
 """`swarm-mj train`: what it prints, writes, refuses, and how it goes on."""
 
 import itertools
+import re
 import shlex
 import signal
 import subprocess
 import sys
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 import torch
 from forks import files
 
 from swarm_mj.cli import main
+from swarm_mj.learning import held_out
 from swarm_mj.learning.run_folder import read_run
 from swarm_mj.learning.train import TrainingSession
 from swarm_mj.policies.stored import read_policy
+from swarm_mj.replay import view
 from swarm_mj.replay.read import windows
+from swarm_mj.system import packages
 
 MISSIONS = ("--robots", "4", "--windows", "12", "--range-ratio", "1", "--missions", "4")
 PPO = ("--rollout-windows", "32", "--minibatches", "10")
@@ -206,3 +211,103 @@ def test_a_run_of_several_sizes_in_a_folder_of_odd_letters_is_kept_and_quoted(ca
     printed = capsys.readouterr().out
     assert "runs/a [red] b: credit per robot, stationary, 3, 4, 5 robots" in printed
     assert "train --out 'runs/a [red] b' --resume" in printed
+
+
+@pytest.fixture
+def viewer(monkeypatch):
+    """A viewer that keeps its recordings to itself, and fails when it is closed after the run."""
+    seen = SimpleNamespace(num_shown=0, num_waits=0)
+
+    def connect(_recording, _address):
+        seen.num_shown += 1
+
+    def wait():
+        seen.num_waits += 1
+        return 1
+
+    @contextmanager
+    def opened(_where):
+        process = SimpleNamespace(wait=wait, poll=lambda: None)
+        yield view.LiveViewer(process=process, address="rerun+http://127.0.0.1:9/proxy", page="P")
+
+    monkeypatch.setattr(view, "live_viewer", opened)
+    monkeypatch.setattr("rerun.RecordingStream.connect_grpc", connect)
+    return seen
+
+
+@pytest.mark.usefixtures("here")
+def test_a_run_that_is_shown_waits_for_its_viewer_in_the_end(viewer, capsys):
+    assert train("--out", "r", *SMALL, "--budget", 128, "--live", "web") == 0
+    assert (viewer.num_shown, viewer.num_waits) == (2, 1)
+    printed = capsys.readouterr()
+    assert "Open P\nCtrl-C ends it." in printed.out
+    assert "policy kept" in printed.out
+    assert train("--out", "r", "--resume", "--live", "web") == 0
+    assert (viewer.num_shown, viewer.num_waits) == (3, 2)
+    assert "Nothing was left to train" in capsys.readouterr().err
+
+
+@pytest.mark.usefixtures("here")
+def test_ctrl_c_ends_a_run_that_is_shown_as_any_other(viewer, capsys):
+    with ctrl_c_at("_on_step", 40):
+        assert train("--out", "r", *SMALL, "--budget", 512, "--live", "web") == 130
+    assert (viewer.num_shown, viewer.num_waits) == (2, 0)
+    assert "Interrupted after 256 decisions; all is kept." in capsys.readouterr().err
+    assert read_run(Path("r")).limits.decisions == 512
+    assert train("--out", "r", "--resume", "--budget", 384) == 0
+
+
+@pytest.mark.usefixtures("here")
+def test_ctrl_c_while_a_mission_is_shown_finishes_the_rollout(viewer, monkeypatch, capsys):
+    flies = held_out.record_first
+
+    def pressing(*arguments):
+        signal.raise_signal(signal.SIGINT)
+        return flies(*arguments)
+
+    monkeypatch.setattr(held_out, "record_first", pressing)
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    assert train("--out", "r", *SMALL, "--budget", 512, "--live", "web") == 130
+    signal.signal(signal.SIGINT, before)
+    assert (viewer.num_shown, viewer.num_waits) == (0, 0)
+    assert "Interrupted after 0 decisions; all is kept." in capsys.readouterr().err
+    assert len((Path("r") / "curve.csv").read_text().splitlines()) == 1 + 1
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        (("--live",), "there is no display .*; --live web"),
+        (("--live", "tv"), "live must be one of window, web, not 'tv'"),
+        (("--live", "web", "--speed", "2"), "unrecognized arguments: --speed"),
+        (("--live", "web", "--sweep", "a.toml"), "--live shows one training; leave it out of a"),
+    ],
+)
+def test_what_cannot_be_shown_is_one_line(here, monkeypatch, capsys, options, message):
+    monkeypatch.delenv("DISPLAY", raising=False)
+    monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
+    try:
+        code = train("--out", "r", *options)
+    except SystemExit as ended:
+        code = ended.code
+    assert code == 2
+    said = capsys.readouterr().err
+    assert re.search(message, said)
+    assert said.count("\n") == 1
+    assert files(here) == []
+
+
+def test_without_rerun_a_training_is_not_shown(here, monkeypatch, capsys):
+    monkeypatch.setattr(packages, "is_installed", lambda _module: False)
+    assert train("--out", "r", *SMALL, "--live", "web") != 0
+    said = capsys.readouterr().err
+    assert "a live replay needs rerun-sdk, which is not installed" in said
+    assert "leave out --live" in said
+    assert files(here) == []
+
+
+def test_a_viewer_that_does_not_open_leaves_no_run(here, monkeypatch, capsys):
+    monkeypatch.setattr(view, "VIEWER", (sys.executable, "-c", "raise SystemExit(3)"))
+    assert train("--out", "r", *SMALL, "--live", "web") == 1
+    assert "rerun's viewer ended as it was opened (exit code 3)" in capsys.readouterr().err
+    assert files(here) == []

@@ -62,8 +62,17 @@ def test_one_that_fails_is_heard_of_once_and_the_run_goes_on(tmp_path, fails_at)
 
 def test_without_anyone_to_complain_to_it_warns():
     with pytest.warns(UserWarning, match="The logger Notes failed"):
-        Guarded(Notes("finish"), None).finish()
-    Guarded(None, None).finish()
+        Guarded(Notes("finish"), "logger Notes", None).do(lambda notes: notes.finish())
+    Guarded(None, "logger", None).do(lambda notes: notes.finish())
+
+
+def test_what_failed_is_no_longer_there():
+    guarded = Guarded(Notes("finish"), "logger", lambda _: None)
+    guarded.do(lambda notes: notes.start({}, None))
+    assert guarded.is_there
+    guarded.do(lambda notes: notes.finish())
+    assert not guarded.is_there
+    assert not Guarded(None, "logger", None).is_there
 
 
 def test_it_is_loaded_by_name_and_must_be_one(here):

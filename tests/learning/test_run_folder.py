@@ -157,6 +157,8 @@ def test_replays_of_a_training_are_counted():
     each = ON_DISK.of(training.mission, training.mission.num_windows)
     assert ten.file - none.file == pytest.approx(11 * each)
     assert ten.memory > none.memory
+    shown = training_needs(training, Limits(decisions=1000), is_shown=True)
+    assert (shown.memory, shown.file) == (ten.memory, none.file)
 
 
 def test_a_curve_is_read_by_the_names_of_its_columns_and_empty_cells_are_left_out(tmp_path):

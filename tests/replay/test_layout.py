@@ -5,11 +5,14 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from reading import entities, static
+from rerun.blueprint.components import LoopMode, PlayState
 from rerun.chunk import RrdReader
 
 from swarm_mj.replay.layout import WIDTH, legend_height
 from swarm_mj.replay.links import NO_MISMATCH
-from swarm_mj.replay.write import write_replay
+from swarm_mj.replay.rerun_log import RerunLog
+from swarm_mj.replay.training_curve import TrainingCurve
+from swarm_mj.replay.write import new_recording, send_layout, write_replay
 
 ADDRESSED = {"delivered", "lost", "answered", "overheard"}
 BROADCAST = {"transmits", "is heard by"}
@@ -122,3 +125,48 @@ def test_the_ramp_says_whose_knowledge_and_where_it_ends(replay):
 )
 def test_samples_wear_the_colours_of_the_map(replay, name, entity, component):
     assert static(replay, f"/legend/{name}", component) == static(replay, entity, component)
+
+
+def test_a_training_has_a_tab_more_in_front_and_plays_on(still, tmp_path):
+    curve = TrainingCurve(
+        title="age of information [windows]",
+        digits=2,
+        decisions=np.array([0.0]),
+        cost=np.array([9.0]),
+        sem=np.array([0.5]),
+        references={"tdma": 5.0},
+    )
+    names = {}
+    panels = {}
+    for name, its in (("flight", {}), ("training", {"curve": curve})):
+        path = tmp_path / f"{name}.rrd"
+        with new_recording(still.log, **its) as recording:
+            recording.save(path)
+            out = RerunLog([recording], still.log)
+            send_layout(recording, out, is_live=True, **its)
+        names[name] = sorted(each for _, each, _ in views(path))
+        panels[name] = panel(path)
+    more = [
+        "Age of information [windows]: team ± std (green), r4 (white)",
+        "First held-out mission, as the newest policy flies it",
+        "Learning curve: age of information [windows] of held-out missions, over team decisions",
+        "Legend",
+    ]
+    assert names["training"] == sorted([*names["flight"], *more])
+    assert panels == {
+        "flight": {"play_state": "Following", "loop_mode": "Off"},
+        "training": {"play_state": "Playing", "loop_mode": "All"},
+    }
+
+
+def panel(path):
+    """How the mission is played, and what follows its end."""
+    (layout,) = RrdReader(path).blueprints()
+    said = {}
+    for chunk in RrdReader(path).stream(store=layout):
+        batch = chunk.to_record_batch()
+        for field, kind in (("play_state", PlayState), ("loop_mode", LoopMode)):
+            column = f"TimePanelBlueprint:{field}"
+            if column in batch.schema.names:
+                said[field] = kind(batch.column(column).to_pylist()[0][0]).name
+    return said

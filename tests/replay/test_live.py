@@ -152,3 +152,29 @@ def test_a_browser_shows_the_flight_while_it_goes_on_and_ctrl_c_keeps_it(tmp_pat
             flying.wait(timeout=60)
     assert flying.returncode == 130
     assert len(read_footage(path).window) >= 25
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(CHROMIUM is None, reason="it needs Chromium")
+def test_a_browser_shows_the_curve_and_the_mission_while_a_policy_trains(tmp_path):
+    """The curve has its own colours, and the mission goes on between evaluations."""
+    folder = tmp_path / "run"
+    small = ("--robots", "8", "--task", "random-walk", "--windows", "200", "--latent", "4")
+    limits = ("--evaluate-every", "20000", "--budget", "1000000000", "--live", "web")
+    command = [sys.executable, "-m", "swarm_mj", "train", "--out", str(folder), *small, *limits]
+    with (tmp_path / "said.txt").open("w+") as said:
+        training = subprocess.Popen(command, stdout=said, stderr=said)
+        try:
+            address = until(lambda: page_of(said))
+            with browser(address, tmp_path) as screenshot:
+                until(lambda: share_of(palette.REFERENCES[0], screenshot()) > 1e-4, limit_s=180.0)
+                assert share_of(palette.PLOT, screenshot()) > 0.05
+                before = screenshot()
+                until(lambda: np.mean(screenshot() != before) > 1e-3, limit_s=60.0)
+            assert training.poll() is None
+        finally:
+            training.send_signal(signal.SIGINT)
+            training.wait(timeout=120)
+    assert training.returncode == 130
+    assert (folder / "curve.csv").exists()
+    assert (folder / "policy.safetensors").exists()
