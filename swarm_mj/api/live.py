@@ -1,4 +1,4 @@
-"""What is shown while it goes on, as `fly`, `evaluate` and `train` share it."""
+"""Flights and trainings shown while they go on, as `fly`, `evaluate` and `train` share it."""
 
 import atexit
 from collections.abc import Iterator, Mapping

@@ -11,11 +11,14 @@ from rerun.chunk import RrdReader
 from swarm_mj.replay import layers
 from swarm_mj.replay.layer_kinds import Entity, FlatLayer, ReplayLayer, View, of_others
 from swarm_mj.replay.palette import PACKETS
-from swarm_mj.replay.write import write_replay
+from swarm_mj.replay.rerun_log import RerunLog
+from swarm_mj.replay.training_curve import TrainingCurve, draw_training_curve
+from swarm_mj.replay.write import new_recording, send_layout, write_replay
 
 # Where layers are drawn, and nothing without one: other entities are solids, images and texts.
 DRAWN = (
     "arena/",
+    "learning/",
     "tree/",
     "state/now",
     "scene/grid",
@@ -45,7 +48,21 @@ def written(replay, flood_replay, blocked_replay, two_way, tmp_path_factory):
     variance = np.linspace(1.0, 0.0, len(two_way.log.window))  # it agrees in the end
     log = replace(two_way.log, facts=facts, velocity_variance_m2ps2=variance)
     write_replay(log, {"seed": 5}, path)
-    return replay, flood_replay, blocked_replay, path
+    training = path.with_name("training.rrd")
+    curve = TrainingCurve(
+        title="cost",
+        digits=1,
+        decisions=np.array([0.0, 1.0]),
+        cost=np.array([9.0, 8.0]),
+        sem=np.array([1.0, 1.0]),
+        references={"tdma": 7.0},
+    )
+    with new_recording(two_way.log, curve) as recording:
+        recording.save(training)
+        out = RerunLog([recording], two_way.log)
+        draw_training_curve(out, curve)
+        send_layout(recording, out, is_live=True, curve=curve)
+    return replay, flood_replay, blocked_replay, path, training
 
 
 @pytest.fixture(scope="module")
@@ -72,7 +89,8 @@ def test_every_layer_is_drawn_by_some_mission_and_nothing_else(found):
         of_others(each).path for each in (*layers.LINKS.values(), *layers.SCENE_LINKS.values())
     }
     solids = {layers.SCENE_CUT_OFF.path}
-    assert {path for path in found if path.startswith(DRAWN)} - solids == paths
+    texts = {layers.LEARNING.below(name).path for name in ("names", "ticks")}
+    assert {path for path in found if path.startswith(DRAWN)} - solids - texts == paths
 
 
 def test_every_entity_that_is_declared_is_written(found):
