@@ -15,6 +15,7 @@ from swarm_mj.learning.held_out import (
     fly_references,
     held_out_policy,
     notes_of,
+    record_first,
     reference_columns,
 )
 from swarm_mj.learning.selection import MAX_MISSIONS, Choice, Cost
@@ -71,6 +72,15 @@ def test_eq17_flocks_are_judged_by_their_velocity_variance():
     ]
     assert found.velocity_variance == pytest.approx(sum(variance) / 2)
     assert found.objective == found.velocity_variance > 0.0
+
+
+def test_the_mission_that_is_recorded_is_the_first_of_the_first_size():
+    training = replace(small_training(sizes=(3, 6)), silence_logit=1.0)
+    shares = []
+    recorder = record_first(training, NETWORK, shares.append)
+    _, ages = flown(training, 3, HELD_OUT_SEED)
+    assert recorder.log().age_mean.tolist() == ages
+    assert shares == pytest.approx(np.arange(1, 21) / 20)
 
 
 def test_global_random_states_do_not_matter_and_are_left_alone():

@@ -76,7 +76,7 @@ def test_what_failed_is_no_longer_there():
 
 
 def test_it_is_loaded_by_name_and_must_be_one(here):
-    (here / "my_logger.py").write_text(
+    (here / "their_logger.py").write_text(
         "class Mine:\n"
         "    def __init__(self, folder): self.folder = folder\n"
         "    def start(self, settings, folder): pass\n"
@@ -85,6 +85,8 @@ def test_it_is_loaded_by_name_and_must_be_one(here):
         "class Half:\n"
         "    def start(self, settings, folder): pass\n"
     )
-    assert make_logger("my_logger:Mine", here / "run").folder == here / "run"
-    with pytest.raises(ValueError, match="logger my_logger:Half must have start, log and finish"):
-        make_logger("my_logger:Half", here / "run")
+    assert make_logger("their_logger:Mine", here / "run").folder == here / "run"
+    with pytest.raises(
+        ValueError, match="logger their_logger:Half must have start, log and finish"
+    ):
+        make_logger("their_logger:Half", here / "run")
