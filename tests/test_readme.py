@@ -40,6 +40,7 @@ CUT_SHORT = {
     "train": "--budget 40 --robots 5 --windows 10 --held-out 1",
     "train --resume": "--budget 80",
 }
+LEARNS = re.compile(r"\.learn\([\d_]+")  # in Python; steps
 ONLY_PARSED = re.compile("--minutes 30|study run impairments")  # the page trains less before
 # A block that is a file says so in line 1.
 FILE = re.compile(r"^(?:# (?P<file>[a-z_]+\.(?:py|toml))|<!-- (?P<scene>[a-z_]+\.xml) -->)\n")
@@ -107,7 +108,8 @@ def test_a_page_runs_from_top_to_bottom(page, page_folder, forks):
         if file := FILE.match(block.code):
             (page_folder / (file["file"] or file["scene"])).write_text(block.code)
         if block.language == "python":
-            exec(compile(block.code, page, "exec"), namespace)
+            code = LEARNS.sub(".learn(2_000", block.code)
+            exec(compile(code, page, "exec"), namespace)
 
 
 def run_command(line, folder, forks):
