@@ -138,6 +138,7 @@ def _begun_with(training: Training, init: GnnConfig, policy: str, given: Given) 
         network=init.network,
         features=init.features,
         silence_logit=init.silence_logit,
+        most_speech=init.most_speech,
         own_network=init.own_network,
     )
     of_network: Given = {}

@@ -82,7 +82,12 @@ class Flights:
 def held_out_policy(training: Training, network: Network, mission: Mission) -> GnnPolicy:
     """Return the policy under training, as it flies."""
     extractor = make_extractor(training.features, mission)
-    return GnnPolicy(network, extractor, silence_logit=training.silence_logit)
+    return GnnPolicy(
+        network,
+        extractor,
+        silence_logit=training.silence_logit,
+        most_speech=training.most_speech,
+    )
 
 
 def evaluate(

@@ -197,6 +197,7 @@ class GnnActorCritic(ActorCriticPolicy):
             may_address=may_address,
             silence_logit=self._training.silence_logit,
             has_turn=obs["has_turn"].bool().flatten(),
+            most_speech=self._training.most_speech,
         )
         return logits, values
 

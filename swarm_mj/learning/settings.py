@@ -8,7 +8,7 @@ from typing import Literal, get_args
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
-from swarm_mj.policies.policy_config import GnnShape, check_fit
+from swarm_mj.policies.policy_config import LEAST_BOUND, NO_BOUND, GnnShape, check_fit
 from swarm_mj.protocol.mission_costs import (
     AOI,
     BY_REWARD,
@@ -148,6 +148,8 @@ class Training:
         network: The layers of the network that acts; an own one takes what it likes of them.
         shares_trunk: Whether values are one more output of the same network.
         silence_logit: Added to the logit of silence, except in a robot's own turn.
+        most_speech: The probability with which a robot speaks in a window at most, except in its
+            own turn; 1 is no bound.
         reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
         ppo: Settings of PPO.
         missions: Missions flown side by side.
@@ -207,6 +209,14 @@ class Training:
         shown=f"7, features without turns: {TURNLESS_SILENCE:g}, team: the preset's own",
         low=-100.0,
         high=100.0,
+    )
+    most_speech: float = setting(
+        NO_BOUND,
+        "probability with which a robot speaks in a window at most, outside its turn; stored with "
+        "the policy; 1: no bound",
+        label="most-speech",
+        low=LEAST_BOUND,
+        high=NO_BOUND,
     )
     reward: Reward = common_setting(
         "aoi",

@@ -338,6 +338,7 @@ class TrainingSession(BaseCallback):
             network=training.network,
             features=training.features,
             silence_logit=training.silence_logit,
+            most_speech=training.most_speech,
             own_network=training.own_network,
             training=asdict(training) | made,
             evaluation={"aoi_sem": costs.aoi_sem}

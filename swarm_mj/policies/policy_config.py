@@ -15,6 +15,9 @@ SUFFIX = ".safetensors"  # of a stored policy's file
 Edges = Literal["paper", "reference", "both"]
 Activation = Literal["tanh", "relu"]
 Weights = dict[str, np.ndarray]  # by name
+# Of the probability of speech: with the one, any is allowed; with 0, robots could never speak.
+NO_BOUND = 1.0
+LEAST_BOUND = 1e-9
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,6 +112,8 @@ class GnnConfig(PolicyConfig):
     features: str  # the name of a feature set, see `FEATURE_SETS`
     silence_logit: float = setting(0.0, low=-100.0, high=100.0)  # added, but in one's own turn
     own_network: str = ""  # the name of its class, as `module:Name`, if it is a user's own
+    # The probability with which a robot speaks at most, but in its own turn.
+    most_speech: float = setting(NO_BOUND, low=LEAST_BOUND, high=NO_BOUND)
 
     def __post_init__(self) -> None:
         check(self)

@@ -174,6 +174,7 @@ def load_policy(
         StoredGnn(shape=config.network, weights=weights, own=config.own_network),
         extractor,
         config.silence_logit,
+        most_speech=config.most_speech,
         is_deterministic=is_deterministic,
         own_features=own,
     )

@@ -68,6 +68,7 @@ def test_without_options_a_run_has_the_usual_settings(credit):
         ("--rollout-windows", 6, "ppo.num_steps"),
         ("--minibatches", 3, "ppo.num_minibatches"),
         ("--train-windows", 50, "train_windows"),
+        ("--most-speech", 0.3, "most_speech"),
         ("--threads", 2, "threads"),
         ("--task", "flocking", "mission.task"),
         ("--preset", "reference", "mission.preset"),
@@ -122,10 +123,13 @@ def test_groups_are_as_near_to_four_as_the_missions_allow():
 
 
 def test_a_policy_to_begin_with_brings_its_network():
-    config = tiny_config(tiny_network("reference", num_outputs=2), "reference")
+    network = tiny_network("reference", num_outputs=2)
+    config = tiny_config(network, "reference", most_speech=0.25)
     training = asked_settings(given("--latent", 6, "--seed", 3), config)
     assert training.network == config.network
     assert (training.features, training.silence_logit) == ("reference", 1.5)
+    assert training.most_speech == 0.25
+    assert asked_settings(given("--most-speech", 0.5), config).most_speech == 0.5
     with pytest.raises(ValueError, match="--depth 3 is not what the policy p has, 2; leave it"):
         asked_settings(given("--depth", 3), config, Path("p"))
 

@@ -21,11 +21,12 @@ RUNS = [
 ]
 
 
-def model_of(credit, preset, sizes):
+def model_of(credit, preset, sizes, most_speech=1.0):
     """A model whose weights are large enough that decisions depend on what is seen."""
     mission = PRESETS[preset]("random-walk", num_robots=5, num_windows=20, range_ratio=0.6)
     training = usual_settings(credit, mission, sizes, seed=1)
-    training = replace(training, missions=4, network=replace(training.network, latent=8, depth=2))
+    network = replace(training.network, latent=8, depth=2)
+    training = replace(training, missions=4, network=network, most_speech=most_speech)
     model = make_model(training)
     with torch.no_grad():
         for weight in model.policy.parameters():
@@ -47,14 +48,21 @@ def as_tensors(observation):
     return {name: torch.as_tensor(rows) for name, rows in observation.items()}
 
 
-def plain_logits(output, owner, may_address, silence_logit):
+def plain_logits(output, owner, may_address, silence_logit, most_speech):
     """Over the recipients of one robot, from its network's numbers, one after the other."""
     address = output[:, 0].tolist()
     if output.shape[1] == 2:
         at_zero_power = output[may_address, 1].tolist()
         address[owner] = float(np.logaddexp.reduce([*at_zero_power, address[owner]]))
     address[owner] += silence_logit
-    return torch.tensor([a if may_address[k] else -np.inf for k, a in enumerate(address)])
+    logits = torch.tensor([a if may_address[k] else -np.inf for k, a in enumerate(address)])
+    p = torch.softmax(logits.double(), dim=0)
+    speech = 1.0 - p[owner].item()
+    if speech <= most_speech:
+        return logits
+    p *= most_speech / speech
+    p[owner] = 1.0 - most_speech
+    return torch.log(p).float()
 
 
 def robot_by_robot(model, training):
@@ -78,22 +86,30 @@ def robot_by_robot(model, training):
                     values, output = output[:, -1], output[:, :-1]
                 else:
                     values = policy.value_network(*seen)[0, :, 0]
-                bias = 0.0 if graphs.has_turn[row] else training.silence_logit
-                logits = plain_logits(output, i, graphs.may_address[row], bias)
+                has_turn = graphs.has_turn[row]
+                bias = 0.0 if has_turn else training.silence_logit
+                bound = 1.0 if has_turn else training.most_speech
+                logits = plain_logits(output, i, graphs.may_address[row], bias, bound)
                 robots.append((Categorical(logits=logits), values.detach()))
             missions.append(robots)
     return missions
 
 
-@pytest.mark.parametrize(("credit", "preset", "sizes"), RUNS)
+BOUNDED = [("robot", "paper", (3, 5), 1e-4), ("team", "reference", (3, 5), 0.3)]
+
+
+@pytest.mark.parametrize(
+    ("credit", "preset", "sizes", "most_speech"), [*((*run, 1.0) for run in RUNS), *BOUNDED]
+)
 def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
-    credit, preset, sizes
+    credit, preset, sizes, most_speech
 ):
-    model, training = model_of(credit, preset, sizes)
+    model, training = model_of(credit, preset, sizes, most_speech)
     observation = after_some_windows(model)
     actions, value, log_p = model.policy(observation)
     again = model.policy.evaluate_actions(observation, actions)
     expected = {"value": [], "log_p": [], "entropy": []}
+    is_at_bound = []
     missions = robot_by_robot(model, training)
     teams = actions.split([len(m) for m in missions]) if credit == "robot" else actions
     for robots, chosen in zip(missions, teams, strict=True):
@@ -104,6 +120,7 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
             "log_p": [distribution.log_prob(chosen[i]) for i, (distribution, _) in each],
             "entropy": [distribution.entropy() for distribution, _ in robots],
         }
+        is_at_bound += [d.probs[i].item() < 1.0001 - most_speech for i, (d, _) in each]
         for name, numbers in of_each.items():
             expected[name] += numbers if credit == "robot" else [sum(numbers)]
     found = [("value", value), ("log_p", log_p), *zip(expected, again, strict=True)]
@@ -111,6 +128,7 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
         close = {"atol": 2e-5, "rtol": 1e-4}
         torch.testing.assert_close(numbers.detach(), torch.stack(expected[name]), **close)
     torch.testing.assert_close(model.policy.predict_values(observation), value)
+    assert most_speech == 1.0 or any(is_at_bound)
 
 
 @pytest.mark.parametrize(("preset", "nodes"), [("paper", 5), ("reference", 25)])

@@ -17,7 +17,7 @@ from swarm_mj.system.reading import read_json
 @pytest.mark.parametrize("commit", ["abc123", None])
 def test_a_config_comes_back_as_it_was(features, commit):
     network = tiny_network(features, num_outputs=2, edges="reference", is_linear=True)
-    config = tiny_config(network, features, commit=commit, silence_logit=-2.25)
+    config = tiny_config(network, features, commit=commit, silence_logit=-2.25, most_speech=0.5)
     assert read_json(json.dumps(asdict(config)), GnnConfig) == config
 
 
@@ -37,6 +37,8 @@ LACKING = [
         ("features", "paper", "num_features is 18, but the paper features are 8"),
         ("features", "all", "extended, or module:Name of your own, not 'all'"),
         ("silence_logit", 100.5, "silence_logit must be a number from -100 to 100, not 100.5"),
+        ("most_speech", 1.5, "most_speech must be a number from 1e-09 to 1, not 1.5"),
+        ("most_speech", 0.0, "most_speech must be a number from 1e-09 to 1, not 0"),
         ("silence_logit", math.nan, "JSON is malformed"),
         ("training", [], "Expected `object`, got `array` - at .*training"),
         ("commit", 5, r"Expected `str \| null`, got `int` - at .*commit"),

@@ -1,6 +1,7 @@
 """Policies on disk: as they were saved, whole at any moment, and refused where they are not."""
 
 import json
+import math
 import os
 import struct
 import subprocess
@@ -15,6 +16,7 @@ from safetensors import safe_open
 from safetensors.numpy import load_file, save_file
 from tiny_policies import FEATURES, save_tiny, tiny_config, tiny_network
 
+from swarm_mj.api.fly import fly
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
@@ -91,6 +93,29 @@ def test_a_loaded_network_gives_identical_logits(tmp_path, features, shape):
     parent = torch.tensor(rng.integers(-1, 5, (4, 5)))
     assert torch.equal(loaded(node, parent), network(node, parent))
     assert all(parameter.requires_grad for parameter in loaded.parameters())
+
+
+@pytest.mark.parametrize("most_speech", [1.0, 0.25])
+def test_a_stored_policy_keeps_its_bound_on_speech(tmp_path, most_speech):
+    """An untrained robot would speak almost always."""
+    network = tiny_network("paper")
+    config = tiny_config(network, "paper", silence_logit=-20.0, most_speech=most_speech)
+    policy = load_policy(save_gnn(tmp_path / "mine", network, config), MISSION)
+    run = fly(replace(MISSION, num_windows=400), policy=policy, seed=1)
+    share = run.summary.packets_attempted / (3 * 400)
+    assert share == pytest.approx(most_speech, abs=4.0 * math.sqrt(0.25 * 0.75 / 1200))
+
+
+def test_a_file_that_names_no_bound_has_none(tmp_path):
+    """As all files had, before there was one."""
+    network = tiny_network("paper")
+    path = save_gnn(tmp_path / "mine", network, tiny_config(network, "paper"))
+
+    def before(said):
+        del said["config"]["most_speech"]
+
+    rewritten(path, change_metadata=before)
+    assert read_policy(path)[1].most_speech == 1.0
 
 
 def test_a_plain_network_comes_back_as_it_was(plain):

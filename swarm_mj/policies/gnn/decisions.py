@@ -1,5 +1,7 @@
 """From the network's numbers to logits over recipients (III-C)."""
 
+import math
+
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
@@ -8,12 +10,15 @@ from torch import Tensor
 from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.learned import IMPOSSIBLE
+from swarm_mj.policies.policy_config import NO_BOUND
 
 
 def network_logits(
     network: Network,
     graphs: Graphs,
+    *,
     silence_logit: float,
+    most_speech: float = NO_BOUND,
     memory: Float[np.ndarray, "R H"] | None = None,
 ) -> tuple[Float[np.ndarray, "R N"], Float[np.ndarray, "R H"] | None]:
     """Return each robot's logits over recipients, row by row, from its own graph.
@@ -40,6 +45,7 @@ def network_logits(
                 owner=owner,
                 may_address=may_address,
                 silence_logit=silence_logit,
+                most_speech=most_speech,
                 has_turn=torch.from_numpy(graphs.has_turn),
             ).numpy()
             return logits, None if remembered is None else remembered.cpu().numpy()
@@ -83,13 +89,15 @@ def recipient_logits(
     may_address: Bool[Tensor, "R N"],
     silence_logit: float = 0.0,
     has_turn: Bool[Tensor, "R"] | None = None,
+    most_speech: float = NO_BOUND,
 ) -> Float[Tensor, "R N"]:
     """Return each robot's logits over recipients; oneself is silence (III-C).
 
     With one number per node it is the node's logit. With two, as in the authors' code, they are the
     logits of addressing it at full and at zero power; all that send nothing count together. Each
     row is of one robot, its `owner`, whose silence gains `silence_logit` unless it has a turn.
-    Recipients that it may not address have `IMPOSSIBLE`; the owner always may.
+    Recipients that it may not address have `IMPOSSIBLE`; the owner always may. Without a turn it
+    speaks with a probability of at most `most_speech`.
     """
     own = owner[:, None]
     logits, *others = output.unbind(dim=2)
@@ -103,4 +111,28 @@ def recipient_logits(
         if has_turn is not None:
             bias = bias.masked_fill(has_turn[:, None], 0.0)
         logits = logits.scatter_add(1, own, bias)
-    return logits.masked_fill(~may_address, IMPOSSIBLE)
+    logits = logits.masked_fill(~may_address, IMPOSSIBLE)
+    if most_speech == NO_BOUND:
+        return logits
+    return _bounded(logits, own, most_speech, has_turn)
+
+
+def _bounded(
+    logits: Float[Tensor, "R N"],
+    own: Int[Tensor, "R 1"],
+    most_speech: float,
+    has_turn: Bool[Tensor, "R"] | None,
+) -> Float[Tensor, "R N"]:
+    """Return logits with which robots speak no more often than they may.
+
+    The likeliest failure of a small team is a jam that locks in: who hears nothing has old news,
+    thinks that it is due, and speaks. Credit hardly unlearns that, as in a jam nobody alone changes
+    anything. So the bound holds whatever the network says, and the recipients of those who do speak
+    stay as likely among themselves.
+    """
+    silence = logits.gather(1, own)
+    speech = logits.scatter(1, own, IMPOSSIBLE).logsumexp(dim=1, keepdim=True)
+    least = speech + math.log(1.0 / most_speech - 1.0)
+    if has_turn is not None:
+        least = least.masked_fill(has_turn[:, None], IMPOSSIBLE)
+    return logits.scatter(1, own, torch.maximum(silence, least))

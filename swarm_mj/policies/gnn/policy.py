@@ -13,7 +13,7 @@ from jaxtyping import Float
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.policy import Parameters
-from swarm_mj.policies.policy_config import GnnShape, Weights
+from swarm_mj.policies.policy_config import NO_BOUND, GnnShape, Weights
 
 if TYPE_CHECKING:
     from swarm_mj.policies.gnn.network import Network
@@ -43,6 +43,7 @@ class GnnPolicy(LearnedPolicy):
         extractor: FeatureExtractor,
         silence_logit: float = 0.0,
         *,
+        most_speech: float = NO_BOUND,
         is_deterministic: bool = False,
         own_features: str = "",
     ) -> None:
@@ -53,6 +54,8 @@ class GnnPolicy(LearnedPolicy):
                 One that was stored becomes torch's when it flies first.
             extractor: It makes the features, of the mission that is flown.
             silence_logit: Added to silence, except in a robot's own turn.
+            most_speech: The probability with which a robot speaks in a window at most, except in
+                its own turn; 1 is no bound.
             is_deterministic: Whether robots take the most probable recipient instead of a draw.
             own_features: The name of the features, as `module:Name`, if they are a user's own.
         """
@@ -60,6 +63,7 @@ class GnnPolicy(LearnedPolicy):
         self._network = network
         self._own = network.own if isinstance(network, StoredGnn) else ""
         self._silence_logit = silence_logit
+        self._most_speech = most_speech
         self._memory: np.ndarray | None = None
         self.uses = f"{extractor.uses}, by a trained graph neural network"
         if isinstance(network, StoredGnn) and network.own:
@@ -87,12 +91,20 @@ class GnnPolicy(LearnedPolicy):
         from swarm_mj.policies.gnn.decisions import network_logits
 
         network = self._live_network()
-        logits, self._memory = network_logits(network, graphs, self._silence_logit, self._memory)
+        logits, self._memory = network_logits(
+            network,
+            graphs,
+            silence_logit=self._silence_logit,
+            most_speech=self._most_speech,
+            memory=self._memory,
+        )
         return logits
 
     def identity(self) -> tuple[object, Weights]:
         """Return what the network is made of and sees, and its weights now."""
         made_of = (self._network.shape, self._extractor.names, self._silence_logit)
+        if self._most_speech != NO_BOUND:  # else the digest stays that of earlier versions
+            made_of = (*made_of, self._most_speech)
         if self._own:
             made_of = (*made_of, self._own)
         if isinstance(self._network, StoredGnn):

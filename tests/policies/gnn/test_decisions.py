@@ -59,6 +59,35 @@ def test_masked_recipients_are_impossible_at_either_power():
     np.testing.assert_allclose(found, expected, rtol=1e-6)
 
 
+TURNS = [None, [True, False], [False, False]]
+
+
+@pytest.mark.parametrize("has_turn", TURNS)
+@pytest.mark.parametrize("most_speech", [0.05, 0.3, 0.6, 0.95])
+def test_speech_is_at_most_as_probable_as_the_bound_but_in_ones_turn(most_speech, has_turn):
+    """By the distribution without it: robots that speak too often are scaled down to the bound."""
+    turns = has_turn and torch.tensor(has_turn)
+    output = torch.stack([FULL, ZERO], dim=2)
+    for numbers in (output, output[:, :, :1]):
+        free = torch.softmax(recipient_logits(numbers, OWNER, MASKED, 0.5, turns), dim=1)
+        bounded = recipient_logits(numbers, OWNER, MASKED, 0.5, turns, most_speech)
+        found = torch.softmax(bounded, dim=1)
+        for row, owner in enumerate(OWNER.tolist()):
+            speech = 1.0 - free[row, owner].item()
+            is_bound = speech > most_speech and not (has_turn and has_turn[row])
+            share = most_speech / speech if is_bound else 1.0
+            expected = [share * p for p in free[row].tolist()]
+            expected[owner] = 1.0 - share * speech
+            np.testing.assert_allclose(found[row], expected, rtol=1e-5, atol=1e-7)
+        assert torch.all(found[~MASKED] == 0.0)
+
+
+def test_a_bound_of_one_leaves_logits_as_they_are_to_the_bit():
+    assert logits(FULL[:, :, None]) == FULL.tolist()
+    free = recipient_logits(FULL[:, :, None], OWNER, ALL, 1.0, most_speech=1.0)
+    assert torch.equal(free, recipient_logits(FULL[:, :, None], OWNER, ALL, 1.0))
+
+
 @pytest.mark.parametrize("num_outputs", [1, 2])
 def test_gradients_reach_every_number_that_counts(num_outputs):
     output = torch.stack([FULL, ZERO], dim=2)[:, :, :num_outputs].clone().requires_grad_()

@@ -116,20 +116,38 @@ def test_one_policy_flies_teams_of_any_size(tmp_path, preset):
         assert np.all(swarm.buffers.timestamp <= 12.0)
 
 
+@pytest.mark.parametrize("most_speech", [0.1, 0.4])
+def test_an_untrained_robot_speaks_no_more_often_than_it_may(most_speech):
+    """Without a bound all would speak in every window, and nobody would hear anything."""
+    policy = learned("buffer", silence_logit=-10.0, most_speech=most_speech)
+    recipient = decisions(policy, range(10))
+    speaks = recipient != np.arange(MISSION.num_robots)
+    error = np.sqrt(most_speech * (1.0 - most_speech) / speaks.size)
+    assert abs(speaks.mean() - most_speech) < 4.0 * error
+
+
+def test_a_bound_that_no_robot_meets_changes_no_flight():
+    """Sharp, but all but silent robots."""
+    free = learned("buffer", silence_logit=3.0, sharpness=1.0)
+    bounded = learned("buffer", silence_logit=3.0, sharpness=1.0, most_speech=0.9)
+    np.testing.assert_array_equal(decisions(bounded, [1, 2]), decisions(free, [1, 2]))
+
+
 def test_the_digest_tells_whatever_changes_decisions():
     def digest(**options):
         return learned(**options).parameters["digest"]
 
     others = ({"seed": 2}, {"silence_logit": 0.5}, {"features": "paper"}, {"outputs": 2})
+    others = (*others, {"most_speech": 0.5})
     found = {digest(), *(digest(**options) for options in others)}
     for edges in ("paper", "reference"):
         policy = GnnPolicy(tiny_network(edges=edges), make_extractor("extended", MISSION))
         found.add(policy.parameters["digest"])
     with torch.no_grad():
         policy._network.output.bias[0] += 1e-6
-    assert len({*found, policy.parameters["digest"]}) == 8
+    assert len({*found, policy.parameters["digest"]}) == 9
     assert policy.parameters["receptive_field"] == 1
-    assert digest() == digest(is_deterministic=True)
+    assert digest() == digest(is_deterministic=True) == digest(most_speech=1.0)
 
 
 def test_threads_and_gradients_are_left_as_they_were():
