@@ -8,6 +8,7 @@ from swarm_mj.policies.gnn.buffer_features import BufferFeatures
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
+from swarm_mj.policies.gnn.turn_features import TurnFeatures
 from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.user_code import FORM, load
 
@@ -15,6 +16,7 @@ FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
     "paper": PaperFeatures,
     "reference": ReferenceFeatures,
     "buffer": BufferFeatures,
+    "turns": TurnFeatures,
     "local": LocalFeatures,
     "extended": ExtendedFeatures,
 }

@@ -19,6 +19,7 @@ from swarm_mj.policies.gnn.feature_sets import (
 )
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
+from swarm_mj.policies.gnn.turn_features import TurnFeatures
 
 
 @pytest.mark.parametrize(
@@ -27,6 +28,7 @@ from swarm_mj.policies.gnn.graphs import PaperFeatures, ReferenceFeatures
         ("paper", PaperFeatures, 1 + 1 + 1 + 2 + 2 + 1),  # two flags, T, p, v, L (III-A)
         ("reference", ReferenceFeatures, 7),
         ("buffer", BufferFeatures, 21),
+        ("turns", TurnFeatures, 38),
         ("local", LocalFeatures, 18 - 5),  # without the turns agreed beforehand
         ("extended", ExtendedFeatures, 18),
     ],
@@ -38,7 +40,7 @@ def test_a_set_is_found_by_its_name_and_has_so_many_features(features, kind, cou
 
 @pytest.mark.parametrize("refuse", [lambda name: make_extractor(name, paper()), num_features])
 def test_unknown_features_are_a_clear_error(refuse):
-    assert set(FEATURE_SETS) == {"paper", "reference", "buffer", "local", "extended"}
+    assert set(FEATURE_SETS) == {"paper", "reference", "buffer", "turns", "local", "extended"}
     with pytest.raises(ValueError, match="extended, or module:Name of your own, not 'all'"):
         refuse("all")
 
