@@ -15,6 +15,7 @@ from swarm_mj.envs.credit import credits_of, snapshot_channel
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
+from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.checks import checked_robots
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
 from swarm_mj.protocol.mission_costs import AOI, BY_REWARD, TASK_COST, VELOCITY_VARIANCE
@@ -45,8 +46,21 @@ class MissionBatch:
         with_parents: bool = False,
         components: Components = Components(),
         keeps_recipients: bool = False,
+        unknown_age: float = 0.0,
     ) -> None:
-        """Take arguments as of `make_batch`; `keeps_recipients` lets checkpoints fly it again."""
+        """Take arguments as of `make_batch`.
+
+        Args:
+            mission: As there, as are those down to `components`.
+            num_missions: B.
+            features: As there.
+            reward: As there.
+            with_parents: As there.
+            components: Channel, controller and scene, where they are not the mission's own.
+            keeps_recipients: Whether decisions are kept, so that checkpoints can fly it again.
+            unknown_age: How much older than the mission a teammate never heard of counts in
+                credits [windows].
+        """
         self.mission = mission
         self.num_missions = num_missions
         self.shape = (num_missions, mission.num_robots)  # B N
@@ -56,6 +70,7 @@ class MissionBatch:
         self.swarm: Swarm | None = None  # made when it begins
         self._components = components
         self._keeps_recipients = keeps_recipients
+        self._unknown_age = unknown_age
         self._extractor = make_extractor(features, mission)
         self.num_features = len(self._extractor.names)  # F
 
@@ -105,6 +120,9 @@ class MissionBatch:
         swarm = self.flown
         # The credit replays this window, so it needs T and the channel's draws from before it.
         before = swarm.buffers.timestamp.copy()
+        # The first news of a teammate lowers the age by the few windows flown, and a robot that
+        # waits for more loses nothing: so it may count for more.
+        before[~swarm.buffers.is_known] = NEVER - self._unknown_age
         start = swarm.now
         channel = snapshot_channel(swarm.channel)
         self.fly(recipient)

@@ -189,6 +189,7 @@ def _make_batches(training: Training) -> list[MissionBatch]:
             reward="credit" if training.credit_assignment == "robot" else training.reward,
             components=training.components,
             keeps_recipients=True,
+            unknown_age=training.unknown_age,
         )
         batches.append(batch)
     return batches

@@ -151,6 +151,8 @@ class Training:
         most_speech: The probability with which a robot speaks in a window at most, except in its
             own turn; 1 is no bound.
         reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
+        unknown_age: How much older than the mission a teammate never heard of counts in credits per
+            robot [windows].
         ppo: Settings of PPO.
         missions: Missions flown side by side.
         train_windows: Windows after which missions in training begin anew, if they have more;
@@ -223,6 +225,16 @@ class Training:
         "the cost to lower; velocity-variance needs --credit team",
         choices=[cost.reward for cost in LEARNED_COSTS],
     )
+    # Early on, first news lowers ages by few windows and earns next to nothing.
+    unknown_age: float = setting(
+        0.0,
+        "how much older than the mission a teammate never heard of counts in credits; more lets "
+        "robots speak sooner",
+        label="unknown-age",
+        unit="windows",
+        low=0.0,
+        high=10_000.0,
+    )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     # The first windows are the hardest: who begins more often practises them more.
@@ -261,6 +273,8 @@ class Training:
             raise ValueError("robots must have at least 1 size")
         if self.credit_assignment == "robot" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
+        if self.credit_assignment == "team" and self.unknown_age > 0.0:
+            raise ValueError("unknown-age counts in credits per robot; choose credit robot, or 0")
 
     @property
     def num_windows(self) -> int:

@@ -69,6 +69,7 @@ def test_without_options_a_run_has_the_usual_settings(credit):
         ("--minibatches", 3, "ppo.num_minibatches"),
         ("--train-windows", 50, "train_windows"),
         ("--most-speech", 0.3, "most_speech"),
+        ("--unknown-age", 25.0, "unknown_age"),
         ("--threads", 2, "threads"),
         ("--task", "flocking", "mission.task"),
         ("--preset", "reference", "mission.preset"),

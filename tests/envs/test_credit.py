@@ -24,10 +24,10 @@ def random_recipients(rng, shape, share):
     return np.where(rng.random(shape) < share, rng.integers(0, shape[1], shape), silence)
 
 
-def credits_by_replay(swarm, channel, buffers, recipient, now):
+def credits_by_replay(swarm, channel, buffers, recipient, now, unknown_age=0.0):
     """Every robot silenced in turn, all else as it was, by the public protocol on copies.
 
-    Only pairs of robots that still work count.
+    Only pairs of robots that still work count; what is still unknown counts as older.
     """
     on = swarm.states.is_active
     counted = 1.0 if on is None else on[:, :, None] & on[:, None, :]
@@ -35,10 +35,14 @@ def credits_by_replay(swarm, channel, buffers, recipient, now):
     def total_after(recipient):
         replayed = copy.deepcopy(buffers)
         window(replayed, *settled(swarm.states, recipient), copy.deepcopy(channel), now)
-        return (replayed.timestamp * counted).sum(axis=(1, 2))
+        return worth(replayed)
+
+    def worth(buffers):
+        seen = np.where(buffers.is_known, buffers.timestamp, -unknown_age)
+        return (seen * counted).sum(axis=(1, 2))
 
     together = total_after(recipient)
-    np.testing.assert_array_equal(together, (swarm.buffers.timestamp * counted).sum(axis=(1, 2)))
+    np.testing.assert_array_equal(together, worth(swarm.buffers))
     credit = np.zeros(recipient.shape)
     for i in range(recipient.shape[1]):
         without = recipient.copy()
@@ -47,10 +51,12 @@ def credits_by_replay(swarm, channel, buffers, recipient, now):
     return credit
 
 
-def assert_rewards_are_those_of_a_replay(mission, seeds, num_windows, share, channel=None):
+def assert_rewards_are_those_of_a_replay(
+    mission, seeds, num_windows, share, channel=None, unknown_age=0.0
+):
     """In each window of random talk; returns all credits."""
-    own = Components(channel=channel)
-    batch = MissionBatch(mission, len(seeds), features="paper", reward="credit", components=own)
+    its = {"components": Components(channel=channel), "unknown_age": unknown_age}
+    batch = MissionBatch(mission, len(seeds), features="paper", reward="credit", **its)
     batch.restart(seeds)
     credited, rng = [], np.random.default_rng(seeds[0])
     for _ in range(num_windows):
@@ -58,7 +64,7 @@ def assert_rewards_are_those_of_a_replay(mission, seeds, num_windows, share, cha
         buffers, before = copy.deepcopy(swarm.buffers), snapshot_channel(swarm.channel)
         recipient = random_recipients(rng, batch.shape, share)
         found = batch.step(recipient) * mission.num_robots**2
-        expected = credits_by_replay(swarm, before, buffers, recipient, now)
+        expected = credits_by_replay(swarm, before, buffers, recipient, now, unknown_age)
         np.testing.assert_allclose(found, expected, atol=1e-9)
         assert np.all(found[recipient == np.arange(mission.num_robots)] == 0.0)
         assert np.all(found[~batch.is_active] == 0.0)
@@ -113,6 +119,25 @@ def test_a_window_replayed_for_credit_meets_the_same_world(mission, channel):
     credit = assert_rewards_are_those_of_a_replay(mission, [4, 2, 3], 16, 0.35, channel)
     assert np.count_nonzero(credit) > 10
     assert np.any(credit < 0.0)  # some packet destroyed another
+
+
+@pytest.mark.parametrize("mission", [WALKING, FAILING], ids=["walking", "robots that fail"])
+def test_unknown_teammates_count_as_older_in_a_credit(mission):
+    """By the same replay: whoever is known counts as before."""
+    seeds = [4, 2, 3]
+    usual = assert_rewards_are_those_of_a_replay(mission, seeds, 16, 0.2)
+    older = assert_rewards_are_those_of_a_replay(mission, seeds, 16, 0.2, unknown_age=25.0)
+    assert older[:5].sum() > 2.0 * usual[:5].sum()  # first news is worth more
+    # News of teammates that the robot knows are worth what they were.
+    assert np.sum((usual == older) & (usual != 0.0)) > 10
+
+
+def test_who_was_known_at_the_start_is_not_unknown():
+    mission = paper("random-walk", num_robots=6, range_ratio=0.6, prior_knowledge="start")
+    usual = assert_rewards_are_those_of_a_replay(mission, [1, 2], 6, 0.3)
+    older = assert_rewards_are_those_of_a_replay(mission, [1, 2], 6, 0.3, unknown_age=25.0)
+    np.testing.assert_array_equal(older, usual)
+    assert np.any(usual > 0.0)
 
 
 def standing(position_m):

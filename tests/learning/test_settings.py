@@ -75,6 +75,10 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
         ({"evaluate_every": 0}, "evaluation interval must be a whole number from 1"),
         ({"robots": (10, 1)}, "robots must be a whole number from 2 to 200, not 1"),
         ({"reward": "velocity-variance"}, "reward velocity-variance is a team's"),
+        (
+            {"unknown_age": -1.0},
+            r"unknown-age must be a number from 0 to 10000 \[windows\], not -1",
+        ),
         ({"robots": ()}, "robots must have at least 1 size"),
         ({"features": "paper"}, "num_features is 18, but the paper features are 8"),
     ],
@@ -82,6 +86,11 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
 def test_what_is_out_of_range_is_refused(changes, complaint):
     with pytest.raises(ValueError, match=complaint):
         replace(small_training(), **changes)
+
+
+def test_unknown_teammates_count_in_credits_per_robot_alone():
+    with pytest.raises(ValueError, match="unknown-age counts in credits per robot; choose credit"):
+        replace(small_training("team"), unknown_age=20.0)
 
 
 @pytest.mark.parametrize("preset", [paper, reference])
