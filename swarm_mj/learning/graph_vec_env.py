@@ -41,9 +41,10 @@ class GraphVecEnv(SwarmVecEnv):
         self.num_nodes = max(training.robots)  # of every graph
         if self.agent == "team" and training.reward == "aoi":
             self.reward_unit = float(training.mission.num_windows)
-        self._num_windows = training.num_windows
+        self._least_windows = training.least_windows
+        self._most_windows = training.most_windows
         for n, batch in enumerate(self.batches):
-            last_window = self._num_windows * (n + 1) // len(self.batches)
+            last_window = self._draw_windows() * (n + 1) // len(self.batches)
             batch.restart(self._draw_seeds(batch), max(1, last_window))
         sizes: list[int] = []  # of each mission's team
         for batch in self.batches:
@@ -106,7 +107,14 @@ class GraphVecEnv(SwarmVecEnv):
     def _begin(self, n: int) -> None:
         if self.memory is not None:
             self.memory[self._rows[n]] = 0.0
-        self.batches[n].restart(self._draw_seeds(self.batches[n]), self._num_windows)
+        last_window = self._draw_windows()
+        self.batches[n].restart(self._draw_seeds(self.batches[n]), last_window)
+
+    def _draw_windows(self) -> int:
+        """Return after how many windows missions that now begin are cut off."""
+        if self._least_windows == self._most_windows:
+            return self._most_windows  # without a draw: seeds stay what they were
+        return int(self.rng.integers(self._least_windows, self._most_windows + 1))
 
     def _draw_seeds(self, batch: MissionBatch) -> list[int]:
         # One generator for all batches: a checkpoint keeps its state alone.

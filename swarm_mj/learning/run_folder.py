@@ -204,7 +204,7 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - LIBRARIES - TORCH) + passes
-    file = WINDOW_BYTES * training.missions * size * training.num_windows + CHECKPOINT_BYTES
+    file = WINDOW_BYTES * training.missions * size * training.most_windows + CHECKPOINT_BYTES
     if is_shown or limits.replay_every is not None:
         memory += IN_MEMORY.of(first, first.num_windows)
     if limits.replay_every is not None:

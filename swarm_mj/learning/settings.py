@@ -155,8 +155,9 @@ class Training:
             robot [windows].
         ppo: Settings of PPO.
         missions: Missions flown side by side.
-        train_windows: Windows after which missions in training begin anew, if they have more;
-            None is when they end. Evaluations always fly whole missions.
+        train_windows: Windows after which missions in training begin anew, if they have more: a
+            number, or the least and the most of a number drawn for each of them; none is when they
+            end. Evaluations always fly whole missions.
         groups: Groups of missions that end at different times.
         seed: The same seed is the same policy.
         evaluate_every: Team decisions between two evaluations.
@@ -238,10 +239,10 @@ class Training:
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     # The first windows are the hardest: who begins more often practises them more.
-    train_windows: int | None = setting(
-        None,
-        "windows after which missions in training begin anew, if they have more; evaluations fly "
-        "all of --windows",
+    train_windows: tuple[int, ...] = setting(
+        (),
+        "windows after which missions in training begin anew, if they have more; of two, the least "
+        "and the most of a number drawn for each; evaluations fly all of --windows",
         label="train-windows",
         low=1,
         high=MAX_DECISIONS,
@@ -271,16 +272,26 @@ class Training:
         check_fit(self.network, self.features)
         if not self.robots:
             raise ValueError("robots must have at least 1 size")
+        if len(self.train_windows) > 2 or list(self.train_windows) != sorted(self.train_windows):
+            given = " ".join(map(str, self.train_windows))
+            raise ValueError(
+                f"train-windows must be one number, or the least and the most: {given}"
+            )
         if self.credit_assignment == "robot" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
         if self.credit_assignment == "team" and self.unknown_age > 0.0:
             raise ValueError("unknown-age counts in credits per robot; choose credit robot, or 0")
 
     @property
-    def num_windows(self) -> int:
-        """Windows after which missions in training begin anew."""
+    def least_windows(self) -> int:
+        """The least windows after which missions in training begin anew."""
+        return min((*self.train_windows, self.mission.num_windows))
+
+    @property
+    def most_windows(self) -> int:
+        """The most windows after which missions in training begin anew."""
         whole = self.mission.num_windows
-        return min(self.train_windows or whole, whole)
+        return min(max(self.train_windows, default=whole), whole)
 
     @property
     def cost(self) -> MissionCost:

@@ -67,7 +67,6 @@ def test_without_options_a_run_has_the_usual_settings(credit):
         ("--discount", 0.75, "ppo.discount"),
         ("--rollout-windows", 6, "ppo.num_steps"),
         ("--minibatches", 3, "ppo.num_minibatches"),
-        ("--train-windows", 50, "train_windows"),
         ("--most-speech", 0.3, "most_speech"),
         ("--unknown-age", 25.0, "unknown_age"),
         ("--threads", 2, "threads"),
@@ -86,6 +85,11 @@ def test_every_option_reaches_its_setting_and_no_other(option, value, place):
         part = getattr(usual, owner) if owner else usual
         part = replace(part, **{its: value})
         assert changed == (replace(usual, **{owner: part}) if owner else part)
+
+
+def test_missions_in_training_have_one_length_or_one_between_two():
+    assert asked("--train-windows", 50).train_windows == (50,)
+    assert asked("--train-windows", 50, 200).train_windows == (50, 200)
 
 
 def test_features_bring_the_networks_inputs_along_and_presets_the_papers_way():

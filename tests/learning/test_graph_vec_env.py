@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
-from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED
+from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import HELD_OUT_SEED, usual_settings
 from swarm_mj.mission import paper
@@ -85,7 +85,7 @@ def test_missions_that_are_cut_are_truncated_and_others_end(credit):
 
 def test_missions_of_training_may_end_before_those_that_are_asked_for():
     """Four batches that first end after 2, 4, 6 and 8 windows; from then on after 8 of 12."""
-    env, rng = env_of("robot", train_windows=8), np.random.default_rng(2)
+    env, rng = env_of("robot", train_windows=(8,)), np.random.default_rng(2)
     env.reset()
     rows = env.num_envs // 4
     for window in range(1, 2 * 8 + 1):
@@ -96,6 +96,34 @@ def test_missions_of_training_may_end_before_those_that_are_asked_for():
             # They were cut off, so what would have come next has a value.
             assert all(bool(info) == bool(done[batch][0]) for info in infos[batch])
     assert env.batches[0].mission.num_windows == WINDOWS
+
+
+def test_missions_of_training_may_have_lengths_that_are_drawn_anew():
+    """From 3 to 7 of 12 windows, the first ones cut at their shares; as the generator draws."""
+    env, rng = env_of("robot", train_windows=(3, 7)), np.random.default_rng(2)
+    dice = np.random.default_rng(1)
+
+    def draw():
+        length = dice.integers(3, 8)
+        dice.integers(FIRST_TRAINING_SEED, LAST_TRAINING_SEED, MISSIONS // 4)
+        return int(length)
+
+    left = [max(1, draw() * (n + 1) // 4) for n in range(4)]
+    assert [batch.last_window for batch in env.batches] == left
+    env.reset()
+    rows = env.num_envs // 4
+    lengths = set()
+    for _ in range(60):
+        _, _, done, infos = env.step(drawn(env, rng))
+        for n in range(4):
+            left[n] -= 1
+            assert done[n * rows] == (left[n] == 0)
+            assert bool(infos[n * rows]) == (left[n] == 0)  # it was cut off
+            if left[n] == 0:
+                left[n] = draw()
+                lengths.add(left[n])
+                assert env.batches[n].last_window == left[n]
+    assert lengths == {3, 4, 5, 6, 7}
 
 
 def test_a_robots_reward_is_its_credit_per_pair():

@@ -35,6 +35,7 @@ pytestmark = pytest.mark.slow  # `cli/test_own_parts.py` holds the law once
 RESUMED = {
     "robot, discounted": {"discount": 0.9},
     "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},
+    "robot, lengths drawn": {"train_windows": (6, 15), "unknown_age": 20.0, "most_speech": 0.3},
     "team, two sizes": {"credit": "team", "sizes": (4, 6)},
     "robot, two sizes, with a memory": {"sizes": (4, 6), "own_network": "tiny_networks:Counting"},
     "team, for the flock": {"credit": "team", "task": "flocking", "reward": "velocity-variance"},

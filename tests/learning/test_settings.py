@@ -55,9 +55,16 @@ def test_credit_per_team_under_the_reference_preset_is_the_authors():
 
 def test_missions_of_training_have_at_most_the_windows_of_those_asked_for():
     training = usual_settings("robot", paper("stationary", num_windows=300), (40,))
-    assert training.num_windows == 300
-    assert replace(training, train_windows=200).num_windows == 200
-    assert replace(training, train_windows=301).num_windows == 300
+    for given, least, most in (
+        ((), 300, 300),
+        ((200,), 200, 200),
+        ((301,), 300, 300),
+        ((40, 250), 40, 250),
+        ((40, 301), 40, 300),
+        ((301, 400), 300, 300),
+    ):
+        its = replace(training, train_windows=given)
+        assert (its.least_windows, its.most_windows) == (least, most)
 
 
 def test_silence_is_dropped_only_where_it_earns_nothing():
@@ -79,6 +86,8 @@ def test_silence_is_dropped_only_where_it_earns_nothing():
             {"unknown_age": -1.0},
             r"unknown-age must be a number from 0 to 10000 \[windows\], not -1",
         ),
+        ({"train_windows": (50, 40)}, "one number, or the least and the most: 50 40"),
+        ({"train_windows": (1, 2, 3)}, "one number, or the least and the most: 1 2 3"),
         ({"robots": ()}, "robots must have at least 1 size"),
         ({"features": "paper"}, "num_features is 18, but the paper features are 8"),
     ],
