@@ -69,8 +69,7 @@ def mean_hops(
     beforehand came over no radio, so has no depth. Raises ValueError if parents form no trees.
     """
     hops = np.empty(buffers.parent.shape[0])
-    counts = np.ones(buffers.shape, dtype=np.bool_) if is_active is None else is_active
-    if not _mean_depth(buffers.timestamp, buffers.parent, counts, hops):
+    if not _mean_depth(buffers.timestamp, buffers.parent, is_active, hops):
         raise ValueError("parents of known robots must lead back to the buffer's owner")
     return hops
 
@@ -206,7 +205,7 @@ def _measure(
 def _mean_depth(
     timestamp: Float[np.ndarray, "B N N"],
     parent: Int[np.ndarray, "B N N"],
-    is_active: Bool[np.ndarray, "B N"],
+    is_active: Bool[np.ndarray, "B N"] | None,
     hops: Float[np.ndarray, "B"],
 ) -> bool:
     """Fill `hops`; return whether all parents form trees."""
@@ -216,23 +215,42 @@ def _mean_depth(
     for b in range(num_missions):
         total = 0
         num_known = 0
-        for i in np.nonzero(is_active[b])[0]:
-            depth[:] = -1
-            depth[i] = 0
+        for i in range(num_robots):
+            if is_active is not None and not is_active[b, i]:
+                continue
+            if not _write_depths(timestamp[b, i], parent[b, i], i, path, depth):
+                return False
             for j in range(num_robots):
-                if timestamp[b, i, j] > NEVER and j != i:
-                    # Up to a robot whose depth is known, then back down, so that each is met once.
-                    k = j
-                    length = 0
-                    while depth[k] < 0:
-                        path[length] = k
-                        length += 1
-                        k = parent[b, i, k]
-                        if k < 0 or length == num_robots:
-                            return False
-                    for step in range(length - 1, -1, -1):
-                        depth[path[step]] = depth[k] + length - step
-                    total += is_active[b, j] * depth[j]
-                    num_known += is_active[b, j]
+                counts = is_active is None or is_active[b, j]
+                if counts and timestamp[b, i, j] > NEVER and j != i:
+                    total += depth[j]
+                    num_known += 1
         hops[b] = total / num_known if num_known else 0.0
+    return True
+
+
+@compiled(makes_arrays=False)
+def _write_depths(
+    timestamp: Float[np.ndarray, "N"],
+    parent: Int[np.ndarray, "N"],
+    i: int,
+    path: Int[np.ndarray, "N"],
+    depth: Int[np.ndarray, "N"],
+) -> bool:
+    """Write how deep in robot i's tree those are that it has heard of; return if it is a tree."""
+    depth[:] = -1
+    depth[i] = 0
+    for j in range(len(depth)):
+        if timestamp[j] > NEVER:
+            # Up to a robot whose depth is known, then back down, so that each is met once.
+            k = j
+            length = 0
+            while depth[k] < 0:
+                path[length] = k
+                length += 1
+                k = parent[k]
+                if k < 0 or length == len(depth):
+                    return False
+            for step in range(length - 1, -1, -1):
+                depth[path[step]] = depth[k] + length - step
     return True

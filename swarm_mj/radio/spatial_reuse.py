@@ -95,19 +95,6 @@ def write_joined(
             has_joined[k] = slot.is_sender[k]
 
 
-@compiled(makes_arrays=False)
-def believes_as_the_last(
-    believed_m: Float[np.ndarray, "N N 2"], is_known: Bool[np.ndarray, "N N"], i: int
-) -> bool:
-    """Return whether robot i believes what the one before it does: beliefs then decide the same."""
-    for k in range(is_known.shape[0] if i > 0 else 0):
-        x_is_same = believed_m[i, k, 0] == believed_m[i - 1, k, 0]
-        y_is_same = believed_m[i, k, 1] == believed_m[i - 1, k, 1]
-        if not (x_is_same and y_is_same) or is_known[i, k] != is_known[i - 1, k]:
-            return False
-    return i > 0
-
-
 @compiled()
 def keep_joined(
     believed_m: Float[np.ndarray, "B N N 2"],

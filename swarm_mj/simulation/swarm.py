@@ -351,7 +351,7 @@ class Swarm:
             return None
         states = self._states_for(self._controller_is_ours)
         value = np.asarray(controller.cost(states), dtype=np.float64)
-        if value.shape != self.now.shape or not np.all(value >= 0.0):
+        if value.shape != self.now.shape or not (value >= 0.0).all():
             raise ValueError(
                 f"a controller's cost must have shape {self.now.shape}, one number of 0 or more "
                 f"for each mission, not {np.array2string(value, threshold=8)}"

@@ -12,7 +12,6 @@ from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.radio.power_law import no_powers
 from swarm_mj.radio.spatial_reuse import (
     ask_in_turn,
-    believes_as_the_last,
     empty_slot,
     keep_joined,
     write_joined,
@@ -117,13 +116,3 @@ def test_by_granted_powers_too_each_robot_goes_by_its_own_beliefs():
     args = (believed_m, np.arange(4)[None], np.array([0]), 250.0, belief.radio.threshold)
     keep_joined(*args, is_sending, no_powers(belief.law_over_noise(4), 1))
     assert is_sending[0].tolist() == [True, False, True, False]
-
-
-@pytest.mark.parametrize("axis", [0, 1])
-def test_robots_believe_alike_only_if_places_and_acquaintances_are_the_same(axis):
-    believed_m = np.tile(np.arange(10.0).reshape(5, 2), (5, 1, 1))
-    is_known = np.ones((5, 5), dtype=np.bool_)
-    believed_m[2:, 4, axis] += 1e-9
-    is_known[4:, 1] = False
-    alike = [believes_as_the_last(believed_m, is_known, i) for i in range(5)]
-    assert alike == [False, True, False, True, False]

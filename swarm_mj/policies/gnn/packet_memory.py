@@ -130,9 +130,9 @@ def logarithm(windows: float) -> float:
 
 
 # Ages are of whole and half windows, so almost all of them are looked up: logarithms were most of
-# the time that these features take.
+# the time that these features take. The last one, 1, is of all that are longer.
 NUM_AGES = round(SLOTS_PER_WINDOW * LONG_WINDOWS)
-LOG_AGES = np.array([math.log1p(n / SLOTS_PER_WINDOW) / LOG_LONG for n in range(NUM_AGES)])
+LOG_AGES = np.array([math.log1p(n / SLOTS_PER_WINDOW) / LOG_LONG for n in range(NUM_AGES)] + [1.0])
 
 
 @compiled()
@@ -148,3 +148,26 @@ def log_age(now: float, then: float, is_granted: bool = False) -> float:
     if place == SLOTS_PER_WINDOW * age and place >= 0:
         return LOG_AGES[place]
     return logarithm(age)
+
+
+@compiled(makes_arrays=False)
+def write_log_ages(
+    now: float, then: Float[np.ndarray, "N"], is_granted: bool, ages: Float32[np.ndarray, "N"]
+) -> None:
+    """Write the ages of N times, each as `log_age` returns it."""
+    num_others = 0
+    for k in range(len(then)):
+        # Without branches, so that the loop becomes vectors: all are looked up, wrong ones, too.
+        has_happened = is_granted | (then[k] > NEVER)
+        place = (
+            min(SLOTS_PER_WINDOW * (now - then[k]), 1.0 * NUM_AGES)
+            if has_happened
+            else 1.0 * NUM_AGES
+        )
+        whole = np.int32(place)
+        is_there = (whole == place) & (whole >= 0)
+        ages[k] = LOG_AGES[whole if is_there else 0]
+        num_others += not is_there
+    if num_others > 0:
+        for k in range(len(then)):
+            ages[k] = log_age(now, then[k], is_granted)

@@ -33,12 +33,17 @@ def empty_beliefs(num_robots: int) -> Beliefs:
 @compiled(makes_arrays=False)
 def take_beliefs(
     believed_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"], beliefs: Beliefs
-) -> None:
-    """Take the beliefs of one robot."""
+) -> bool:
+    """Take the beliefs of one robot; return whether they differ from those taken before."""
+    num_different = 0  # counted, as the loop then has no branches
     for k in range(len(is_known)):
+        x_m = believed_m[k, 0] if is_known[k] else np.inf
+        y_m = believed_m[k, 1]
+        num_different += (x_m != beliefs.x_m[k]) | (y_m != beliefs.y_m[k])
         beliefs.is_known[k] = is_known[k]
-        beliefs.x_m[k] = believed_m[k, 0] if is_known[k] else np.inf
-        beliefs.y_m[k] = believed_m[k, 1]
+        beliefs.x_m[k] = x_m
+        beliefs.y_m[k] = y_m
+    return num_different > 0
 
 
 @compiled(makes_arrays=False)

@@ -8,7 +8,12 @@ from mixed_missions import MISSION as WALK
 from mixed_missions import flown
 
 from swarm_mj.mission import paper
-from swarm_mj.policies.gnn.buffer_features import BufferFeatures, count_before, length
+from swarm_mj.policies.gnn.buffer_features import (
+    BufferFeatures,
+    count_before,
+    length,
+    write_lengths,
+)
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.protocol.buffers import NEVER, empty_buffers
 from swarm_mj.protocol.window import LocalViews
@@ -224,10 +229,20 @@ def test_lengths_are_those_of_hypot_in_single_precision():
     x = lengths * np.cos(angle)
     y = lengths * np.sin(angle)
     found = np.array([length(*place) for place in zip(x.tolist(), y.tolist(), strict=True)])
+    at_once = np.empty_like(x)
+    write_lengths(x, y, at_once)
+    np.testing.assert_array_equal(at_once, found)
+    clear = x[:1], y[:1]  # where no length is looked at twice
+    write_lengths(*clear, at_once[:1])
+    np.testing.assert_array_equal(
+        at_once[:1].astype(np.float32), np.hypot(*clear).astype(np.float32)
+    )
     np.testing.assert_array_equal(found.astype(np.float32), np.hypot(x, y).astype(np.float32))
     np.testing.assert_array_equal(found <= 1.0, np.hypot(x, y) <= 1.0)
 
 
 def test_equal_times_have_the_same_rank():
     times = np.array([3.0, 1.0, np.inf, 1.0, np.inf])
-    assert [count_before(time, times) for time in times] == [2, 0, 3, 0, 3]
+    num_before = np.empty(5)
+    count_before(times, num_before)
+    assert num_before.tolist() == [2, 0, 3, 0, 3]

@@ -1,6 +1,7 @@
 """Turns of four robots, 100 m apart in a line, by hand."""
 
 import numpy as np
+import pytest
 
 from swarm_mj.policies.gnn.turns import count_near, empty_beliefs, take_beliefs, write_turns
 
@@ -55,3 +56,15 @@ def test_the_next_beliefs_take_the_place_of_the_last():
     take_beliefs(BELIEVED_M, np.array(EVERYONE), room)
     count_near(room, 100.0)
     assert room.num_near.tolist() == [2, 3, 3, 2]
+
+
+@pytest.mark.parametrize("axis", [0, 1])
+def test_beliefs_are_new_unless_places_and_acquaintances_are_the_same(axis):
+    believed_m = np.tile(BELIEVED_M, (5, 1, 1))
+    is_known = np.ones((5, 4), dtype=np.bool_)
+    believed_m[2:, 3, axis] += 1e-9
+    is_known[4:, 1] = False
+    room = empty_beliefs(4)
+    take_beliefs(believed_m[0], is_known[0], room)
+    is_new = [take_beliefs(believed_m[i], is_known[i], room) for i in range(1, 5)]
+    assert is_new == [False, True, False, True]
