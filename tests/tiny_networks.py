@@ -52,3 +52,17 @@ class Crooked(Plain):
 
 class NoNetwork:
     """Anything."""
+
+
+class Mixing(Plain):
+    """It compares a robot with all others, as no robot that flies can."""
+
+    def forward(self, node, parent, is_wanted=None, memory=None):
+        return super().forward(node - node.mean(dim=0), parent, is_wanted, memory)
+
+
+class Endless(Plain):
+    """Its numbers are not finite."""
+
+    def forward(self, node, parent, is_wanted=None, memory=None):
+        return super().forward(node, parent, is_wanted, memory) / 0.0

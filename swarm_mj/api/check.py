@@ -1,5 +1,6 @@
 """`swarm_mj.check_convergence`: do missions converge in time, as `swarm-mj check` asks."""
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Unpack
 
@@ -33,7 +34,8 @@ def check_convergence(
     channel: str | None = None,
     controller: str | None = None,
     scene: str | None = None,
-    features: str | tuple[str, ...] = (),
+    features: str | Sequence[str] = (),
+    networks: str | Sequence[str] = (),
     num_jobs: int = 1,
     **mission_fields: Unpack[PresetAndFields],
 ) -> Convergence:
@@ -60,6 +62,7 @@ def check_convergence(
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that edits the MuJoCo model, likewise; none unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
+        networks: Names of your own networks that it decides by.
         num_jobs: Processes, as in `evaluate`.
         **mission_fields: Any field of `Mission`, in its unit, such as `num_robots=20`.
 
@@ -97,6 +100,7 @@ def check_convergence(
         probability=probability,
         is_deterministic=is_deterministic,
         features=(features,) if isinstance(features, str) else tuple(features),
+        networks=(networks,) if isinstance(networks, str) else tuple(networks),
         components=Components(**components),
     )
     options = EngineOptions(jobs=num_jobs)

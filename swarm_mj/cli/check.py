@@ -93,6 +93,7 @@ class CheckOptions(EngineOptions, PolicyOptions):
             probability=self.probability,
             is_deterministic=self.is_deterministic,
             features=self.features,
+            networks=self.networks,
             components=self.components,
         )
 

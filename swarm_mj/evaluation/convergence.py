@@ -88,7 +88,6 @@ class Convergence:
         cost: Its cost in words, with its unit.
         seed: Of the first mission; the others follow one by one.
         window: From which on each mission had converged, [n], nan if it had not at its end.
-        is_final: Whether no more missions are to be flown.
     """
 
     mission: Mission
@@ -98,7 +97,6 @@ class Convergence:
     cost: str
     seed: int
     window: Float[np.ndarray, "n"]
-    is_final: bool
 
     @property
     def seconds(self) -> Float[np.ndarray, "n"]:
@@ -243,7 +241,6 @@ def converging(study: Study, goal: Goal, engine: Engine) -> Generator[Convergenc
                     cost=cost,
                     seed=study.seed,
                     window=np.concatenate(in_order),
-                    is_final=len(in_order) == len(flights),
                 )
                 yield found
                 if found.verdict != "not decided":

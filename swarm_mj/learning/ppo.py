@@ -20,7 +20,7 @@ from swarm_mj.learning.settings import Device, PpoSettings, Training
 from swarm_mj.policies.gnn.decisions import evaluated, recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.network import Network
-from swarm_mj.policies.gnn.own_networks import empty_network, make_network
+from swarm_mj.policies.gnn.own_networks import check_one_by_one, empty_network, make_network
 from swarm_mj.policies.learned import sample
 
 CPU = torch.device("cpu")
@@ -59,8 +59,8 @@ def optimising_device(device: Device) -> torch.device:
 def make_model(training: Training, device: Device = "cpu") -> PPO:
     """Make PPO over fresh missions (III-C).
 
-    Raises ValueError if the missions or the minibatches cannot be made of these settings, or this
-    machine lacks the device, which optimises the networks.
+    Raises ValueError if the missions or the minibatches cannot be made of these settings, an own
+    network mixes robots, or this machine lacks the device, which optimises the networks.
     """
     torch.set_num_threads(training.threads)  # sums that are divided among them round differently
     ppo = training.ppo
@@ -92,6 +92,8 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
             rollout_buffer_kwargs={"silent_share": ppo.silent_share} if drops else None,
             policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
+    if training.own_network:
+        check_one_by_one(policy_of(model).network, training.own_network)
     if graphs.memory is not None:
         graphs.recalls = policy_of(model).recalled
     model.optimises_on = optimising_device(device)

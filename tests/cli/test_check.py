@@ -4,11 +4,16 @@ import json
 from itertools import islice
 
 import pytest
+from tiny_policies import tiny_config
 
+from swarm_mj import check_convergence
 from swarm_mj.cli import check, main, parse
 from swarm_mj.cli.check import MOST_JOBS
 from swarm_mj.evaluation.convergence import converging
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.own_networks import load_network, make_network
+from swarm_mj.policies.policy_config import GnnShape
+from swarm_mj.policies.stored import save_gnn
 from swarm_mj.system.terminal import num_cores
 
 SMALL = ("--robots", "8", "--windows", "60", "--range-ratio", "0.5", "--policy", "tdma")
@@ -97,3 +102,15 @@ def test_an_interrupted_check_shows_what_it_knows(monkeypatch, capsys, here, num
     assert said in printed.err
     assert ("verdict:    not decided" in printed.out) == (num_batches > 0)
     assert (here / "a.json").exists() == (num_batches > 0)
+
+
+def test_a_policy_may_decide_by_a_network_of_ones_own(tmp_path):
+    name = "tiny_networks:Plain"
+    load_network(name)
+    network = make_network(GnnShape(num_features=8), name)
+    path = save_gnn(tmp_path / "mine", network, tiny_config(network, "paper", own_network=name))
+    _, options = parse(["check", "flocking", "--policy", str(path), "--network", name])
+    assert options.study.networks == (name,)
+    arguments = {"num_robots": 4, "num_windows": 100, "max_missions": 2, "num_jobs": 1}
+    found = check_convergence("flocking", policy=path, networks=name, **arguments)
+    assert found.num_missions == 2

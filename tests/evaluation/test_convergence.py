@@ -63,7 +63,6 @@ def test_missions_are_flown_until_the_claim_is_decided():
     assert [each.num_missions for each in found] == list(range(25, last.num_missions + 1, 25))
     assert [each.verdict for each in found] == ["not decided"] * (len(found) - 1) + ["holds"]
     assert last
-    assert not last.is_final
     expected = windows_of(range(40, 40 + last.num_missions))
     np.testing.assert_array_equal(last.window, expected)
     assert last.num_held == np.sum(expected <= 50)
@@ -81,7 +80,7 @@ def test_a_claim_that_is_not_true_is_refuted():
 
 def test_too_few_missions_decide_nothing():
     *_, last = converging(study(episodes=30), Goal(within_s=5.0, share=0.97), Local())
-    assert (last.verdict, last.num_missions, last.is_final) == ("not decided", 30, True)
+    assert (last.verdict, last.num_missions) == ("not decided", 30)
     assert not last
 
 

@@ -11,7 +11,7 @@ from swarm_mj.evaluation.figures import style
 if TYPE_CHECKING:  # which draws itself by this
     from swarm_mj.evaluation.convergence import Convergence
 
-HEIGHT_IN = 3.2
+HEIGHT_IN = 3.8
 SAID = {"holds": "holds", "does not hold": "does not hold", "not decided": "is not decided"}
 
 
@@ -33,7 +33,9 @@ def draw_convergence(found: "Convergence") -> Figure:
     last = shares[-1] if len(shares) else 0.0
     low, high = found.interval
     with style.styled():
-        title = f"{found.policy}: the claim {SAID[found.verdict]}"
+        its = found.mission
+        who = f"{its.task}, {its.num_robots} robots, {found.policy}"
+        title = f"{who}: the claim {SAID[found.verdict]}"
         figure, (axes,) = style.panels(title, rows=1, height_in=HEIGHT_IN)
         steps_s = [0.0, *times_s, end_s]
         label = f"{found.num_missions} missions, {found.cost}"
@@ -47,7 +49,8 @@ def draw_convergence(found: "Convergence") -> Figure:
         axes.set_xlim(0.0, end_s)
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
-        axes.legend(frameon=False, loc="lower right")
+        # Below: the course may run through every corner.
+        figure.legend(frameon=False, loc="outside lower left")
         config = found.config
         style.write_caption(figure, style.code(config["version"], config["commit"]))
     return style.kept(figure)

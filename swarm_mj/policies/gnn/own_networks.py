@@ -76,6 +76,33 @@ def make_network(shape: GnnShape, name: str = "") -> Network:
     return network
 
 
+def check_one_by_one(network: Network, name: str) -> None:
+    """Raise ValueError unless a network's numbers for a robot follow from its own graph.
+
+    A robot that flies has no others' graphs to compute with, while training has many at a time.
+    """
+    draws = torch.Generator().manual_seed(0)  # PyTorch's own generator draws the training
+    num_graphs = 3
+    shape = (num_graphs, 4, network.shape.num_features)
+    node = torch.rand(shape, generator=draws)
+    parent = torch.tensor([-1, 0, 0, 1]).expand(num_graphs, -1)
+    memory = torch.zeros(num_graphs, network.memory_size) if network.memory_size else None
+    was_training = network.training
+    network.eval()
+    with torch.no_grad():
+        together = network(node, parent, None, memory)
+        first = None if memory is None else memory[:1]
+        alone = network(node[:1], parent[:1], None, first)
+    network.train(was_training)
+    if not together.isfinite().all():
+        raise ValueError(f"network {name} returned numbers that are not finite, before training")
+    if not torch.allclose(together[:1], alone, rtol=1e-3, atol=1e-5):
+        raise ValueError(
+            f"network {name} mixes robots: its numbers for one change with the other rows of node; "
+            "leave axis 0 alone, since a robot in flight knows only its own graph"
+        )
+
+
 def empty_network(shape: GnnShape, name: str = "") -> Network:
     """Return a network without weights: it takes no memory, and draws no random numbers."""
     with torch.device("meta"):

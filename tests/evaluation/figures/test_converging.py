@@ -15,7 +15,6 @@ def test_missions_step_up_to_the_share_that_converged_beside_the_claim():
         cost="under 1% of the first velocity variance",
         seed=1,
         window=np.array([30.0, np.nan, 20.0, 50.0]),
-        is_final=True,
     )
     figure = found.plot()
     (axes,) = figure.axes

@@ -8,6 +8,7 @@ from tiny_policies import tiny_config
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn.decisions import evaluated
 from swarm_mj.policies.gnn.own_networks import (
+    check_one_by_one,
     empty_network,
     load_network,
     make_network,
@@ -130,3 +131,19 @@ def test_networks_that_cannot_act_are_refused():
         ValueError, match=r"Crooked.forward must return .* \(2, 4, 1\), not \(2, 1\)"
     ):
         evaluated(make_network(SHAPE, "tiny_networks:Crooked"), *given)
+
+
+def test_a_network_that_mixes_robots_is_refused():
+    """In training many graphs are side by side; a robot in flight has its own alone."""
+    for name, why in (("Mixing", "mixes robots"), ("Endless", "not finite")):
+        load_network(f"tiny_networks:{name}")
+        network = make_network(SHAPE, f"tiny_networks:{name}")
+        with pytest.raises(ValueError, match=f"tiny_networks:{name} .*{why}"):
+            check_one_by_one(network, f"tiny_networks:{name}")
+        assert network.training
+    for name in ("Plain", "Counting"):
+        load_network(f"tiny_networks:{name}")
+        network = make_network(SHAPE, f"tiny_networks:{name}")
+        drawn = torch.get_rng_state()
+        check_one_by_one(network, f"tiny_networks:{name}")
+        assert torch.equal(torch.get_rng_state(), drawn)
