@@ -50,7 +50,7 @@ def draw_convergence(found: "Convergence") -> Figure:
         axes.set_ylim(0.0, 1.02)
         axes.yaxis.set_major_formatter(PercentFormatter(1.0))
         # Below: the course may run through every corner.
-        figure.legend(frameon=False, loc="outside lower left")
+        axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(0.0, -0.2))
         config = found.config
         style.write_caption(figure, style.code(config["version"], config["commit"]))
     return style.kept(figure)
