@@ -72,7 +72,7 @@ class OwnBuffer(NamedTuple):
     spoke: float  # when it last addressed anyone [windows]
 
 
-class Columns(NamedTuple):
+class BufferColumns(NamedTuple):
     """Room for what one robot knows of its teammates: loops over columns become vectors."""
 
     is_known: Bool[np.ndarray, "N"]
@@ -177,8 +177,8 @@ def _write_nodes(
 
 
 @compiled()
-def _empty_columns(num_robots: int) -> Columns:
-    return Columns(
+def _empty_columns(num_robots: int) -> BufferColumns:
+    return BufferColumns(
         is_known=np.empty(num_robots, dtype=np.bool_),
         timestamp_age=np.empty(num_robots, dtype=np.float32),
         attempt_age=np.empty(num_robots, dtype=np.float32),
@@ -200,7 +200,7 @@ def _write_graph(
     per_m: float,
     per_mps: float,
     shares: Float[np.ndarray, "_"],
-    columns: Columns,
+    columns: BufferColumns,
     its: OwnNodes,
     may_address: Bool[np.ndarray, "N"],
 ) -> None:
@@ -216,7 +216,7 @@ def _write_graph(
 
 
 @compiled(forceinline=True, makes_arrays=False)
-def _find_distances(own: OwnBuffer, i: int, per_m: float, columns: Columns) -> None:
+def _find_distances(own: OwnBuffer, i: int, per_m: float, columns: BufferColumns) -> None:
     """Find who is known, and how far off each is believed to be."""
     x_m, y_m = own.position_m[i]
     for k in range(len(columns.x)):
@@ -231,7 +231,7 @@ def _find_distances(own: OwnBuffer, i: int, per_m: float, columns: Columns) -> N
 
 
 @compiled(forceinline=True, makes_arrays=False)
-def _find_staler(own: OwnBuffer, i: int, columns: Columns) -> None:
+def _find_staler(own: OwnBuffer, i: int, columns: BufferColumns) -> None:
     """Find who is staler than robot i, and how many are staler than each."""
     since = columns.since
     for k in range(len(since)):
@@ -243,7 +243,7 @@ def _find_staler(own: OwnBuffer, i: int, columns: Columns) -> None:
 
 
 @compiled(forceinline=True, makes_arrays=False)
-def _count(columns: Columns, shares: Float[np.ndarray, "_"]) -> Shares:
+def _count(columns: BufferColumns, shares: Float[np.ndarray, "_"]) -> Shares:
     """Count how many are known, near and staler."""
     num_robots = len(columns.is_known)
     known = near = within_025 = within_05 = within_1 = within_2 = staler = 0
@@ -271,7 +271,7 @@ def _write_teammates(
     own: OwnBuffer,
     i: int,
     per_mps: float,
-    columns: Columns,
+    columns: BufferColumns,
     shares: Float[np.ndarray, "_"],
     team: Shares,
     its: OwnNodes,

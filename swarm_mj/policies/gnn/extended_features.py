@@ -79,7 +79,7 @@ Timestamps = Float32[np.ndarray, "N"]
 Column = Float32[np.ndarray, "N"]  # a field of one robot's nodes
 
 
-class Columns(NamedTuple):
+class ExtendedColumns(NamedTuple):
     """Room for what one robot knows of its teammates: loops over columns become vectors."""
 
     is_known: Bool[np.ndarray, "N"]
@@ -167,8 +167,8 @@ class LocalFeatures(ExtendedFeatures):
 
 
 @compiled()
-def _empty_columns(num_robots: int) -> Columns:
-    return Columns(
+def _empty_columns(num_robots: int) -> ExtendedColumns:
+    return ExtendedColumns(
         is_known=np.empty(num_robots, dtype=np.bool_),
         ranges=np.empty(num_robots),
         timestamp_age=np.empty(num_robots, dtype=np.float32),
@@ -203,7 +203,7 @@ def _write_nodes(
     now: Float[np.ndarray, "B"],
     range_m: float,
     threshold: float,
-    columns: Columns,
+    columns: ExtendedColumns,
     turns: Turns | None,
     node: Nodes,
     may_address: Flags,
@@ -244,7 +244,7 @@ def _write_team(
     now: float,
     range_m: float,
     threshold: float,
-    columns: Columns,
+    columns: ExtendedColumns,
     turns: Turns | None,
     node: Shaped[np.ndarray, "N N"],
     may_address: Bool[np.ndarray, "N N"],
@@ -290,7 +290,7 @@ def _write_team(
 def _write_teammates(
     i: int,
     range_m: float,
-    columns: Columns,
+    columns: ExtendedColumns,
     turns: Turns | None,
     its: OwnNodes,
     may_address: Bool[np.ndarray, "N"],
@@ -382,7 +382,7 @@ def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[fl
 
 
 @compiled(makes_arrays=False)
-def _find_neighbours(columns: Columns, range_m: float) -> None:
+def _find_neighbours(columns: ExtendedColumns, range_m: float) -> None:
     """Find how many neighbours each robot has, by one robot's beliefs."""
     num_near = columns.beliefs.num_near
     count_near(columns.beliefs, range_m)

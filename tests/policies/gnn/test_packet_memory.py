@@ -8,7 +8,12 @@ import pytest
 from mixed_missions import NUM_ROBOTS, SEEDS, random_recipients
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.policies.gnn.packet_memory import empty_memory, log_age, remember
+from swarm_mj.policies.gnn.packet_memory import (
+    empty_memory,
+    log_age,
+    remember,
+    write_log_ages,
+)
 from swarm_mj.protocol.window import Phase
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.swarm import Swarm
@@ -114,3 +119,15 @@ def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
     assert log_age(3_000.0, 3_000.0 - age) == expected
     assert log_age(age, 0.0) == 1.0  # never
     assert log_age(age, 0.0, True) == expected  # granted at the start
+
+
+@pytest.mark.parametrize("is_granted", [False, True])
+@pytest.mark.parametrize("others", [(), (0.3,), (-0.5, 499.9)])
+def test_ages_of_many_are_those_of_each(others, is_granted):
+    """Of whole and half windows, the longest and never included, and of `others` between them."""
+    now = 700.0
+    then = np.array([0.0, now, *(now - age for age in (0.5, 17.5, 499.5, 500.0, 600.0, *others))])
+    ages = np.empty(len(then), dtype=np.float32)
+    write_log_ages(now, then, is_granted, ages)
+    expected = [log_age(now, each, is_granted) for each in then.tolist()]
+    np.testing.assert_array_equal(ages, np.array(expected, dtype=np.float32))
