@@ -95,7 +95,8 @@ def _read(folder: Path) -> Learned:
 
 def _missions(training: Training) -> str:
     """Return the options that make the missions of a run's evaluations."""
-    flags = mission_flags(replace(training.mission, num_robots=Mission().num_robots))
+    size = Mission().num_robots
+    flags = mission_flags(*(replace(each, num_robots=size) for each in training.all_missions))
     own = "".join(f" --{kind} {name}" for kind, name in training.components.names.items())
     sizes = " ".join(map(str, training.robots))
     return f"{flags} --robots {sizes} --held-out {training.held_out}{own}"

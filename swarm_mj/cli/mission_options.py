@@ -93,17 +93,23 @@ def missions_given(
         if place in given:
             value = given[place]
             swept[spec.name] = list(dict.fromkeys(value)) if isinstance(value, tuple) else [value]
-    missions: list[Mission] = []
-    _check_number(swept)
-    for values in product(*swept.values()):
-        named = dict(zip(swept, values, strict=True))
-        missions.append(make_mission(**named))
+    missions = combined(swept)
     check_in_use(swept, missions, called)
     for index, mission in enumerate(missions):
         if mission.num_high_power == 0:
             # A fraction that rounds to no robot makes the missions of 0, which are flown once.
             missions[index] = replace(mission, high_power_fraction=0.0)
     return tuple(dict.fromkeys(missions))
+
+
+def combined(swept: Mapping[str, Collection[Any]]) -> list[Mission]:
+    """Return a mission for each combination of fields' values; ValueError for too many of them."""
+    _check_number(swept)
+    missions: list[Mission] = []
+    for values in product(*swept.values()):
+        named = dict(zip(swept, values, strict=True))
+        missions.append(make_mission(**named))
+    return missions
 
 
 def _check_number(swept: Mapping[str, Collection[Any]]) -> None:
@@ -141,18 +147,24 @@ def check_in_use(
             raise ValueError(f"{own} counts only with {other} {switch.state or 'above 0'}; {ways}")
 
 
-def mission_flags(mission: Mission) -> str:
-    """Return the options that make a mission, without defaults except for the task."""
-    usual = replace(PRESETS[mission.preset](mission.task), preset=Mission().preset)
+def mission_flags(*missions: Mission) -> str:
+    """Return the options that make missions, without defaults except for the task."""
+    preset = Mission().preset
+    usual = [replace(PRESETS[each.preset](each.task), preset=preset) for each in missions]
     flags: list[str] = []
     for spec in SPECS:
-        value = getattr(mission, spec.name)
-        if spec.name != "task" and value == getattr(usual, spec.name):
+        values = values_of(spec.name, missions)
+        if spec.name != "task" and values == values_of(spec.name, usual):
             continue
         flags.append(flags_of(spec)[0])
-        if value is not True:
-            flags.append(shlex.quote(as_typed(value)))
+        if values[0] is not True:  # else it is a flag
+            flags += [shlex.quote(as_typed(value)) for value in values]
     return " ".join(flags)
+
+
+def values_of(name: str, missions: Sequence[Mission]) -> tuple[Any, ...]:
+    """Return a field's values in missions, each once, in order."""
+    return tuple(dict.fromkeys(getattr(mission, name) for mission in missions))
 
 
 def about_option(spec: Field[Any]) -> Meaning:

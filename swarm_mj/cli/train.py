@@ -11,7 +11,7 @@ from rich.console import Console
 
 from swarm_mj.api.live import check_live, live_option, open_viewer
 from swarm_mj.cli import train_settings
-from swarm_mj.cli.mission_options import mission_flags
+from swarm_mj.cli.mission_options import mission_flags, values_of
 from swarm_mj.cli.options import Given, nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.evaluation.engines import GROUP, EngineOptions
@@ -218,13 +218,14 @@ def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) 
     console = plain_console()
     credit = training.credit_assignment
     sizes = ", ".join(map(str, training.robots))
+    tasks = ", ".join(values_of("task", training.all_missions))
     rows = {
         **report(asked, progress),
         "decisions": f"{progress.decisions:,}",
         "minutes": f"{progress.minutes:.1f}",
         "its policy": str(out / POLICY) if progress.best else "none yet",
     }
-    title = f"{out}: credit per {credit}, {training.mission.task}, {sizes} robots"
+    title = f"{out}: credit per {credit}, {tasks}, {sizes} robots"
     console.print(named_values(title, rows))
     for line in verdicts(asked, progress):
         console.print(line)
@@ -233,7 +234,7 @@ def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) 
         more = " --patience 0"
     if progress.best is not None:
         flown = f"--policy {shlex.quote(str(out / POLICY))}"
-        flags = mission_flags(replace(training.mission, num_robots=training.robots[0]))
+        flags = mission_flags(training.kinds[0])
         flags += f" {training.own_options}" if training.own else ""
         console.print(f"Fly:      {this_command()} fly {flown} {flags}")
         console.print(f"Evaluate: {this_command()} evaluate {flown} tdma {flags}")

@@ -80,8 +80,9 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     choice = progress.choice or _best_so_far(run, progress, progress.best)
     cost = training.cost if is_chosen else AOI  # evaluations tell the error of the age alone
     use = "not used to select the policy" if is_chosen else "which selected the policy"
+    kind = "kind" if training.other_missions else "team size"
     rows = {
-        "missions": f"{choice.num_missions} of each team size, {use}",
+        "missions": f"{choice.num_missions} of each {kind}, {use}",
         "policy kept": f"{_amount(choice.kept, cost)}, after {choice.decisions:,} decisions",
     }
     for name, each in choice.others.items():

@@ -11,10 +11,16 @@ from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.mission_options import FLAGS, about_option, check_in_use
+from swarm_mj.cli.mission_options import (
+    FLAGS,
+    about_option,
+    check_in_use,
+    combined,
+    values_of,
+)
 from swarm_mj.cli.options import Given, Option, flags_of
 from swarm_mj.learning.settings import TURNLESS_SILENCE, PpoSettings, Training, usual_settings
-from swarm_mj.mission import PRESETS, Mission, make_mission
+from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
     check_named,
@@ -34,7 +40,10 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "network.": (GnnShape, "network"),
     "ppo.": (PpoSettings, "PPO"),
     "components.": (Components, GROUP),
-    "mission.": (Mission, "missions"),
+    "mission.": (
+        Mission,
+        "missions: each takes several values, trained on together; they multiply",
+    ),
 }
 
 
@@ -58,7 +67,8 @@ def setting_options() -> Iterator[Option]:
         _, heading = PARTS[place.removesuffix(spec.name)]
         about = about_option(spec) if place.startswith("mission.") else meaning_of(spec)
         about = replace(about, group=heading, shown=_usual(place))
-        yield Option(spec, about, place, is_nested=True)
+        is_many = place.startswith("mission.")
+        yield Option(spec, about, place, is_many=is_many, is_nested=True)
 
 
 def given_settings(given: Given) -> Given:
@@ -86,11 +96,13 @@ def asked_settings(
     network = _part("network", given)
     ppo = _part("ppo", given)
     sizes = own.get("robots", (Mission().num_robots,))
-    mission = _mission(_part("mission", given), sizes[0])
+    mission, *others = _missions(_part("mission", given), sizes[0])
     training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
+    training = replace(training, other_missions=tuple(others))
     if init is not None:
         training = _begun_with(training, init, f"policy {init_path}", given)
-    missions = _missions(own.get("missions"), training.missions, len(sizes))
+    num_kinds = len(training.kinds)
+    missions = _num_missions(own.get("missions"), training.missions, num_kinds)
     components = Components(**_part("components", given))
     training = replace(training, missions=missions, components=components)
     # The user's own features count only once they are loaded, and the network is made for them.
@@ -99,16 +111,19 @@ def asked_settings(
         network["num_features"] = num_features(own["features"])
         if init is None:
             own = _usual_silence(own, training) | own
+    if others and training.credit_assignment == "robot":
+        own = {"credit_scaling": "kind"} | own
     training = replace(
         training,
-        groups=_num_groups(missions, len(sizes)),
+        groups=_num_groups(missions, num_kinds),
         network=replace(training.network, **network),
         ppo=replace(training.ppo, **ppo),
         **own,  # last: what is given for the run itself goes before what follows from the rest
     )
-    for size in training.robots:
-        check_whole("training", replace(mission, num_robots=size))
-    if training.reward == "velocity-variance" and not mission.flocks:
+    for kind in training.kinds:
+        check_whole("training", kind)
+    flocks = all(each.flocks for each in training.all_missions)
+    if training.reward == "velocity-variance" and not flocks:
         rule = "reward velocity-variance depends on who talks only if the robots flock"
         raise ValueError(f"{rule}; add --task flocking")
     return training
@@ -123,12 +138,14 @@ def _usual_silence(own: Given, training: Training) -> Given:
     return {}
 
 
-def _mission(asked: Given, num_robots: int) -> Mission:
+def _missions(asked: Given, num_robots: int) -> tuple[Mission, ...]:
     """Return what is flown; raise ValueError for an option that would change nothing."""
-    usual = {"task": "stationary", "num_robots": num_robots}
-    mission = make_mission(**usual | asked)
-    check_in_use(asked, [mission], FLAGS.__getitem__)
-    return mission
+    swept = {"task": ("stationary",), "num_robots": (num_robots,)}
+    for name, value in asked.items():
+        swept[name] = value if isinstance(value, tuple) else (value,)  # a flag has one
+    missions = combined(swept)
+    check_in_use(asked, missions, FLAGS.__getitem__)
+    return tuple(dict.fromkeys(missions))
 
 
 def _begun_with(training: Training, init: GnnConfig, policy: str, given: Given) -> Training:
@@ -168,13 +185,17 @@ def load_own(features: str, network: str, training: Training) -> None:
         load_network(network)
     if is_own_set(features):
         load_features(features)
-    training.components.made(training.mission)
+    for mission in training.all_missions:
+        training.components.made(mission)
 
 
 def refuse_others(given: Given, training: Training, whose: str) -> None:
     """Raise ValueError if a setting contradicts a run, or the policy that it begins with."""
     for place, value in given.items():
+        owner, _, name = place.rpartition(".")
         stored = attrgetter(place)(training)
+        if owner == "mission" and isinstance(value, tuple):
+            stored = values_of(name, training.all_missions)
         if value != stored:
             typed = f"{flags_of(SPECS[place])[0]} {as_typed(value)}"
             raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
@@ -190,18 +211,19 @@ def _part(part: str, given: Given) -> Given:
     return settings
 
 
-def _missions(asked: int | None, usual: int, num_sizes: int) -> int:
-    """Return the number of missions side by side: as many of every team size."""
+def _num_missions(asked: int | None, usual: int, num_kinds: int) -> int:
+    """Return the number of missions side by side: as many of every kind."""
     if asked is None:
-        return -(-usual // num_sizes) * num_sizes
-    if asked % num_sizes:
-        raise ValueError(f"missions must be a multiple of the {num_sizes} team sizes, not {asked}")
+        return -(-usual // num_kinds) * num_kinds
+    if asked % num_kinds:
+        rule = f"missions must be a multiple of the {num_kinds} kinds (team sizes by missions)"
+        raise ValueError(f"{rule}, not {asked}")
     return asked
 
 
-def _num_groups(missions: int, num_sizes: int) -> int:
-    """Return a number near to the usual one of groups, each with as many of every team size."""
-    able = [n for n in range(num_sizes, missions + 1, num_sizes) if missions % n == 0]
+def _num_groups(missions: int, num_kinds: int) -> int:
+    """Return a number near to the usual one of groups, each with as many of every kind."""
+    able = [n for n in range(num_kinds, missions + 1, num_kinds) if missions % n == 0]
     return min(able, key=lambda n: (abs(n - Training.groups), -n), default=1)
 
 

@@ -72,6 +72,7 @@ def save(
         # When a run goes on, its missions are flown again from seeds and decisions, from which all
         # that physics, channel and buffers hold follows.
         "recipients": recipients,
+        "credit_scales": [[scale.total, scale.count] for scale in env_of(model).credit_scales],
         # It followed from weights that are no more.
         "memory": None if memory is None else torch.tensor(memory),
         "seeds": [batch.seeds for batch in batches],
@@ -142,6 +143,10 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
         env.memory[:] = state["memory"].numpy()
     model._last_obs = env.replay(state["seeds"], state["last_windows"], recipients)
     model._last_episode_starts = state["episode_starts"].numpy()
+    if env.credit_scales:
+        for scale, (total, count) in zip(env.credit_scales, state["credit_scales"], strict=True):
+            scale.total = total
+            scale.count = count
     rewards = model.get_env()
     if isinstance(rewards, VecNormalize):
         for name in MOMENTS:

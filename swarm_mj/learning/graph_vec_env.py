@@ -4,7 +4,7 @@ Batches are staggered, so that every rollout holds windows from all parts of a m
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from itertools import cycle
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.vec_env import SwarmVecEnv
+from swarm_mj.learning.credit_scale import CreditScale
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.policies.gnn.own_networks import empty_network
@@ -24,7 +25,8 @@ from swarm_mj.protocol.buffers import NO_PARENT
 class GraphVecEnv(SwarmVecEnv):
     """Environments for PPO over the Aggregation GNN, per robot or per team by its credit.
 
-    Per robot, the reward is the robot's credit, over the number of pairs. Per team, it is the
+    Per robot, the reward is the robot's credit, over the number of pairs, and then by what credits
+    of its kind of mission usually are if they are scaled. Per team, it is the
     negative mean age of information over the mission's duration, or the negative velocity
     variance, as in Fig. 6. Smaller teams are padded: per team with robots that do not exist, which
     are silent and see nothing.
@@ -33,11 +35,14 @@ class GraphVecEnv(SwarmVecEnv):
     def __init__(self, training: Training, rng: np.random.Generator) -> None:
         """Begin missions, whose seeds `rng` draws; the first ones are cut off at different windows.
 
-        Raises ValueError if they cannot be shared out evenly, or a size would have no batch.
+        Raises ValueError if they cannot be shared out evenly, or a kind would have no batch.
         """
         self.rng = rng
         self.agent = training.credit_assignment
         self.batches = _make_batches(training)
+        # A scale for each kind of mission, which its batches share; none if credits are not scaled.
+        num_scales = len(training.kinds) if training.credit_scaling == "kind" else 0
+        self.credit_scales = [CreditScale() for _ in range(num_scales)]
         self.num_nodes = max(training.robots)  # of every graph
         if self.agent == "team" and training.reward == "aoi":
             self.reward_unit = float(training.mission.num_windows)
@@ -102,7 +107,10 @@ class GraphVecEnv(SwarmVecEnv):
         if self.memory is not None and self.recalls is not None:
             remembered = self.recalls()
             self.memory[:] = remembered if self.agent == "robot" else remembered[self._is_robot]
-        return super().step_wait()
+        seen, reward, done, infos = super().step_wait()
+        for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
+            reward[envs] = scale.divided(reward[envs])
+        return seen, reward, done, infos
 
     def _begin(self, n: int) -> None:
         if self.memory is not None:
@@ -179,19 +187,19 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
 
 
 def _make_batches(training: Training) -> list[MissionBatch]:
-    """Return batches that share out all missions evenly; team sizes take turns."""
+    """Return batches that share out all missions evenly; their kinds take turns."""
     num_missions = training.missions
     num_batches = training.groups
-    sizes = training.robots
-    if num_missions % num_batches or not len(sizes) <= num_batches <= num_missions:
+    kinds = training.kinds
+    if num_missions % num_batches or not len(kinds) <= num_batches <= num_missions:
         raise ValueError(
             f"missions must be a multiple of their {num_batches} batches, of which each of the "
-            f"{len(sizes)} team sizes needs one, not {num_missions}"
+            f"{len(kinds)} kinds of missions needs one, not {num_missions}"
         )
     batches: list[MissionBatch] = []
     for n in range(num_batches):
         batch = MissionBatch(
-            replace(training.mission, num_robots=sizes[n % len(sizes)]),
+            kinds[n % len(kinds)],
             num_missions // num_batches,
             features=training.features,
             reward="credit" if training.credit_assignment == "robot" else training.reward,

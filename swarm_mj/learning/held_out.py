@@ -7,7 +7,7 @@ the flight.
 
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -46,8 +46,8 @@ from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 
-Flown = list[BatchCosts]  # by team size
-Samples = list[Float[np.ndarray, "B"]]  # by team size
+Flown = list[BatchCosts]  # by kind of mission
+Samples = list[Float[np.ndarray, "B"]]  # by kind of mission
 MakePolicy = Callable[[Mission], Policy]
 OnWindow = Callable[[float], None]
 
@@ -62,17 +62,16 @@ class Flights:
     num_windows: int = 0  # flown
 
     def fly(self, policy_of: MakePolicy, first_seed: int, num_missions: int) -> Flown:
-        """Fly as many missions of each team size, from a seed on; return their costs."""
+        """Fly as many missions of each kind, from a seed on; return their costs."""
         flown: Flown = []
-        for num_robots in self.training.robots:
-            mission = replace(self.training.mission, num_robots=num_robots)
+        for mission in self.training.kinds:
             seeds = range(first_seed, first_seed + num_missions)
             swarm = Swarm(mission, seeds, **self.training.components.given)
             flown.append(costs_of(swarm, self._reported(rollout(swarm, policy_of(mission)))))
         return flown
 
     def _reported(self, flown: Iterator[WindowRecord]) -> Iterator[WindowRecord]:
-        in_all = self.total * len(self.training.robots) * self.training.mission.num_windows
+        in_all = self.total * len(self.training.kinds) * self.training.mission.num_windows
         for window in flown:
             yield window
             self.num_windows += 1
@@ -189,7 +188,7 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
     """Return the card's notes on how a policy was chosen; None: by the evaluations so far."""
     if choice is None:
         return {
-            "missions": training.held_out * len(training.robots),
+            "missions": training.held_out * len(training.kinds),
             "first_seed": HELD_OUT_SEED,
             "chosen_by": "the least objective of all evaluations on these same missions",
         }
@@ -200,7 +199,7 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
             f"missions, from seed {CHOICE_SEED}"
         )
     return {
-        "missions": choice.num_missions * len(training.robots),
+        "missions": choice.num_missions * len(training.kinds),
         "first_seed": TEST_SEED,
         "chosen_by": how,
         "others_on_these_missions": {name: asdict(cost) for name, cost in choice.others.items()},
@@ -209,7 +208,7 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
 
 def record_first(training: Training, network: Network, on_window: OnWindow) -> Recorder:
     """Fly the first held-out mission, as evaluations do; return its record."""
-    mission = replace(training.mission, num_robots=training.robots[0])
+    mission = training.kinds[0]
     swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
     recorder = Recorder(swarm)
     for window in rollout(swarm, held_out_policy(training, network, mission)):
@@ -237,7 +236,8 @@ def _means(training: Training, costs: Flown) -> HeldOutCosts:
     variance = _samples(costs, VELOCITY_VARIANCE)
     if training.cost is AOI:
         # Ages grow with the team; divided by its size, no size outweighs the others.
-        objective = [of_size / n for of_size, n in zip(age, training.robots, strict=True)]
+        sizes = [mission.num_robots for mission in training.kinds]
+        objective = [of_kind / n for of_kind, n in zip(age, sizes, strict=True)]
     else:
         objective = variance
     sent = sum(float(each.packets_sent.sum()) for each in costs)
@@ -255,7 +255,7 @@ def _means(training: Training, costs: Flown) -> HeldOutCosts:
 
 
 def _samples(costs: Flown, cost: MissionCost) -> Samples:
-    """Return each mission's cost, by team size."""
+    """Return each mission's cost, by kind of mission."""
     return [each.of(cost) for each in costs]
 
 
@@ -270,12 +270,12 @@ def _compared(samples: Samples, kept: Samples) -> Cost:
     )
 
 
-def _mean(by_size: Samples) -> float:
-    return float(np.mean([each.mean() for each in by_size]))
+def _mean(by_kind: Samples) -> float:
+    return float(np.mean([each.mean() for each in by_kind]))
 
 
-def _standard_error(by_size: Samples) -> float | None:
-    # Sizes differ, but they are not drawn: the errors of their means add up.
-    errors = [standard_error(each) for each in by_size]
+def _standard_error(by_kind: Samples) -> float | None:
+    # Kinds differ, but they are not drawn: the errors of their means add up.
+    errors = [standard_error(each) for each in by_kind]
     known = [error for error in errors if error is not None]
     return math.hypot(*known) / len(known) if len(known) == len(errors) else None

@@ -7,7 +7,7 @@ on request, `replays/`.
 
 import os
 from collections.abc import Collection
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import NamedTuple
 
@@ -194,7 +194,7 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
 
     One that is shown while it goes on records a mission at a time, as replays do.
     """
-    first = replace(training.mission, num_robots=training.robots[0])  # of the replays
+    first = training.kinds[0]  # of the replays
     size = max(training.robots)
     rollout = rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS

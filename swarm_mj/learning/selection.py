@@ -26,19 +26,19 @@ ORACLE_ROBOTS = 100
 NUM_BEST = 3  # evaluations whose policies are flown again
 OTHER_FLIGHTS = 2 + len(REFERENCES)  # at the end: the one that is kept, again, and the first
 NEAR = 1.25  # times the least objective: worse policies have lost already
-MAX_MISSIONS = 40  # of each team size, to choose
+MAX_MISSIONS = 40  # of each kind, to choose
 FLOWN_SHARE = 0.5  # of a run's decisions, for its choice; they cost less than learning
 RESERVED_SHARE = 0.5  # of a run's minutes, at most, kept back for its choice
 MIN_GAIN = 0.005  # of the objective, that counts as learning
 
 Columns = dict[str, float]  # numbers by the names of the learning curve's columns
-# Each held-out mission's cost, by the name of the curve's column, then by team size.
+# Each held-out mission's cost, by the name of the curve's column, then by kind of mission.
 References = dict[str, list[list[float]]]
 
 
 @dataclass(frozen=True, kw_only=True)
 class HeldOutCosts:
-    """Costs of a policy on the held-out missions: means in which team sizes count alike."""
+    """Costs of a policy on the held-out missions: means in which kinds of missions count alike."""
 
     aoi: float  # age of information [windows]
     aoi_sem: float | None = None  # its standard error over the missions; None of one mission
@@ -109,7 +109,7 @@ class Choice:
     decisions: int  # of teams, that it learned from
     run_decisions: int  # that the run had made when it was chosen
     num_finalists: int
-    num_missions: int  # of each team size that chose it, and as many others that tell its cost
+    num_missions: int  # of each kind that chose it, and as many others that tell its cost
     kept: Cost
     others: dict[str, Cost]  # on the same missions: those of `REFERENCES` that fly, and `first`
 
@@ -266,12 +266,12 @@ def finalists(curve: Sequence[CurveRow]) -> list[CurveRow]:
 
 
 def num_missions(training: Training, decisions: int, num_flights: int) -> int:
-    """Return the missions of each team size that a flight has at the end.
+    """Return the missions of each kind that a flight has at the end.
 
     All flights together take up to a share of the run, but each has at least the missions of an
     evaluation: fewer would tell less than is known already.
     """
-    windows = num_flights * len(training.robots) * training.mission.num_windows
+    windows = num_flights * len(training.kinds) * training.mission.num_windows
     within = int(FLOWN_SHARE * decisions / windows)
     return max(training.held_out, min(MAX_MISSIONS, within))
 

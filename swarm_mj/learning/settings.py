@@ -21,6 +21,7 @@ from swarm_mj.system.fields import check, check_value, common_setting, setting
 from swarm_mj.system.user_code import files_named
 
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
+CreditScaling = Literal["none", "kind"]  # as they are, by what is usual in their kind of mission
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
 LEARNED_COSTS = (AOI, VELOCITY_VARIANCE)  # that a run can lower
 # First seeds of missions, apart from each other: the missions that chose a policy would flatter its
@@ -141,6 +142,7 @@ class Training:
         credit_assignment: "robot", each paid for what its own packets changed, or "team", one
             reward for all.
         mission: What is flown, except for the team's size.
+        other_missions: What else is flown, as many windows long; all are trained on together.
         robots: Sizes of the team, from 2 to `MAX_ROBOTS`; several are trained on together.
         features: What the network sees of each teammate: the name of a feature set, or
             `module:Name`.
@@ -153,6 +155,8 @@ class Training:
         reward: The cost to lower, "aoi" or "velocity-variance"; the latter needs credit per team.
         unknown_age: How much older than the mission a teammate never heard of counts in credits per
             robot [windows].
+        credit_scaling: Whether each kind of mission's credits per robot are divided by their root
+            mean square of late, "kind", or not, "none".
         ppo: Settings of PPO.
         missions: Missions flown side by side.
         train_windows: Windows after which missions in training begin anew, if they have more: a
@@ -161,7 +165,7 @@ class Training:
         groups: Groups of missions that end at different times.
         seed: The same seed is the same policy.
         evaluate_every: Team decisions between two evaluations.
-        held_out: Missions of an evaluation, of each team size.
+        held_out: Missions of an evaluation, of each kind.
         components: Channel, controller and scene, where they are not the mission's own.
         threads: Torch's threads.
 
@@ -183,6 +187,7 @@ class Training:
         former=("arm",),
     )
     mission: Mission
+    other_missions: tuple[Mission, ...] = ()
     robots: tuple[int, ...] = common_setting(
         help="size of the team; several are trained on together",
         low=2,
@@ -236,6 +241,14 @@ class Training:
         low=0.0,
         high=10_000.0,
     )
+    credit_scaling: CreditScaling = setting(
+        "none",
+        "divide credits by their root mean square of late in each kind of mission, so that no kind "
+        "outweighs the others (kind), or not (none)",
+        label="credit-scaling",
+        choices=get_args(CreditScaling),
+        shown="kind with several tasks, ranges or channels, else none",
+    )
     ppo: PpoSettings = PpoSettings()
     missions: int = setting(16, "flown side by side", low=1, high=4096)
     # The first windows are the hardest: who begins more often practises them more.
@@ -259,7 +272,7 @@ class Training:
     )
     held_out: int = setting(
         12,
-        "missions of an evaluation, of each team size",
+        "missions of an evaluation, of each kind: team size, task, range and so on",
         label="held-out missions",
         low=1,
         high=10_000,
@@ -281,6 +294,33 @@ class Training:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
         if self.credit_assignment == "team" and self.unknown_age > 0.0:
             raise ValueError("unknown-age counts in credits per robot; choose credit robot, or 0")
+        if self.credit_assignment == "team" and self.credit_scaling != "none":
+            raise ValueError("credit-scaling is of credits per robot; choose credit robot, or none")
+        for other in self.other_missions:
+            self._check_beside(other)
+
+    def _check_beside(self, other: Mission) -> None:
+        """Raise ValueError if a mission cannot be trained on together with the first."""
+        if other.num_windows != self.mission.num_windows:
+            both = f"{self.mission.num_windows} and {other.num_windows}"
+            raise ValueError(f"missions trained on together must have as many windows, not {both}")
+        # The preset says how values are made of a team's robots.
+        if self.credit_assignment == "team" and other.preset != self.mission.preset:
+            both = f"{self.mission.preset} and {other.preset}"
+            raise ValueError(f"credit team takes one preset, not {both}; choose credit robot")
+
+    @property
+    def all_missions(self) -> tuple[Mission, ...]:
+        """The missions that are trained on together, except for the team's size."""
+        return (self.mission, *self.other_missions)
+
+    @property
+    def kinds(self) -> tuple[Mission, ...]:
+        """The kinds of missions that are trained on together: each with each size of the team."""
+        kinds: list[Mission] = []
+        for mission in self.all_missions:
+            kinds += [replace(mission, num_robots=num_robots) for num_robots in self.robots]
+        return tuple(kinds)
 
     @property
     def least_windows(self) -> int:

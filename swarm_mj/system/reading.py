@@ -11,7 +11,7 @@ import os
 import stat
 from dataclasses import fields, is_dataclass
 from pathlib import Path
-from typing import Annotated, Any, BinaryIO, TypeVar
+from typing import Annotated, Any, BinaryIO, TypeVar, get_args, get_origin
 
 import msgspec
 
@@ -137,6 +137,9 @@ def _with_present_names(value: object, kind: object, at: str = "$") -> object:
     """Return a dataclass's plain values by its fields' present names; ValueError for others."""
     # msgspec itself would drop what is unknown: a newer file would pass. It fills in what lacks and
     # has a default, as such a field is newer than the file, and refuses what has none.
+    if get_origin(kind) is tuple and isinstance(value, list):
+        its = get_args(kind)[0]  # of as many as there are
+        return [_with_present_names(each, its, f"{at}[{n}]") for n, each in enumerate(value)]
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
     known: dict[Any, Any] = {spec.name: spec for spec in fields(kind)}

@@ -152,6 +152,13 @@ def test_the_flags_of_a_mission_make_it_again(wanted):
     assert mission(*shlex.split(mission_flags(wanted))) == wanted
 
 
+def test_the_flags_of_several_missions_make_them_all_again():
+    typed = "--task stationary flocking --robots 9 --range-ratio 1 0.5 --fading none rayleigh"
+    wanted = missions(*typed.split())
+    assert len(wanted) == 8
+    assert mission_flags(*wanted) == typed
+
+
 def test_flags_leave_out_what_is_as_usual():
     assert mission_flags(paper("stationary", num_robots=9)) == "--task stationary --robots 9"
 

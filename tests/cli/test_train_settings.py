@@ -45,7 +45,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         "paper, reference, indoor, urban, open-field (default: paper)",
         "several are trained on together, 2 to 200 (default: 40)",
         "reflect, none (default: the preset's own)",
-        f"of each team size, 1 to 10000 (default: {robot.held_out})",
+        f"task, range and so on, 1 to 10000 (default: {robot.held_out})",
         f"(default: {BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes)",
     ):
         assert text in shown
@@ -122,6 +122,39 @@ def test_sizes_share_the_missions_evenly(sizes, missions, groups):
     assert (training.robots, training.missions, training.groups) == (sizes, missions, groups)
 
 
+def test_several_values_of_missions_multiply_and_share_the_missions_evenly():
+    training = asked(
+        *("--task", "stationary", "flocking", "--range-ratio", 0.5, 1.0, 0.5, "--robots", 10, 20),
+        *("--fading", "none", "rayleigh"),
+    )
+    flown = [(each.task, each.range_ratio, each.fading) for each in training.all_missions]
+    assert flown == [
+        (task, range_ratio, fading)
+        for task in ("stationary", "flocking")
+        for range_ratio in (0.5, 1.0)
+        for fading in ("none", "rayleigh")
+    ]
+    assert len(training.kinds) == training.missions == training.groups == 16
+    assert training.credit_scaling == "kind"
+    alone = asked("--task", "flocking", "--range-ratio", 1.0, "--fading", "rayleigh")
+    assert training.all_missions[-1] == replace(alone.mission, num_robots=10)
+
+
+def test_credits_are_scaled_where_missions_differ_or_as_asked():
+    assert asked("--robots", 10, 20).credit_scaling == "none"
+    assert asked("--range-ratio", 0.5, 1.0).credit_scaling == "kind"
+    assert asked("--range-ratio", 0.5, 1.0, "--credit-scaling", "none").credit_scaling == "none"
+    assert asked("--credit-scaling", "kind").credit_scaling == "kind"
+    team = asked("--credit", "team", "--range-ratio", 0.5, 1.0)
+    assert (team.credit_scaling, len(team.other_missions)) == ("none", 1)
+
+
+def test_what_is_given_must_count_in_one_of_several_missions():
+    asked("--fading", "none", "rician", "--rician-k", 3)
+    with pytest.raises(ValueError, match="--rician-k counts only with --fading"):
+        asked("--fading", "none", "rayleigh", "--rician-k", 3)
+
+
 def test_groups_are_as_near_to_four_as_the_missions_allow():
     expected = {1: 1, 2: 2, 3: 3, 6: 3, 7: 7, 8: 4, 10: 5, 14: 2}
     assert {missions: asked("--missions", missions).groups for missions in expected} == expected
@@ -142,6 +175,10 @@ def test_a_policy_to_begin_with_brings_its_network():
 def test_a_run_that_goes_on_has_its_own_settings():
     training = asked("--latent", 5)
     refuse_others(given("--latent", 5, "--robots", 40), training, "the run")
+    several = asked("--range-ratio", 0.5, 1.0)
+    refuse_others(given("--range-ratio", 0.5, 1.0), several, "the run")
+    with pytest.raises(ValueError, match=r"--range-ratio 0\.5 is not what the run has"):
+        refuse_others(given("--range-ratio", 0.5), several, "the run")
     with pytest.raises(ValueError, match="--credit team is not what the run has, robot; leave it"):
         refuse_others(given("--credit", "team"), training, "the run")
 

@@ -155,6 +155,69 @@ def test_a_robots_reward_is_its_credit_per_pair():
     assert np.any(reward != 0.0)
 
 
+def several_kinds(credit="robot", **changes):
+    """Two sizes by two missions that differ in task, range and channel: four batches."""
+    mission = paper("random-walk", num_robots=3, num_windows=WINDOWS, range_ratio=0.7)
+    other = paper("flocking", num_robots=3, num_windows=WINDOWS, range_ratio=1.0, erasure=0.2)
+    training = replace(usual_settings(credit, mission, (3, 5)), other_missions=(other,))
+    training = replace(training, missions=MISSIONS, groups=4, **changes)
+    return training, GraphVecEnv(training, np.random.default_rng(1))
+
+
+@pytest.mark.parametrize("credit", CREDITS)
+def test_every_kind_of_mission_has_its_batches(credit):
+    training, env = several_kinds(credit)
+    flown = [batch.mission for batch in env.batches]
+    assert flown == list(training.kinds)
+    assert [(each.task, each.range_ratio, each.erasure, each.num_robots) for each in flown] == [
+        ("random-walk", 0.7, 0.0, 3),
+        ("random-walk", 0.7, 0.0, 5),
+        ("flocking", 1.0, 0.2, 3),
+        ("flocking", 1.0, 0.2, 5),
+    ]
+    assert env.num_nodes == 5
+
+
+def test_credits_of_each_kind_are_divided_by_their_own_scale():
+    """Next to the same missions without scales: a factor each, by all of its credits so far."""
+    (_, plain), (_, scaled) = several_kinds(), several_kinds(credit_scaling="kind")
+    rng = np.random.default_rng(2)
+    total, count = np.zeros(4), np.zeros(4)
+    plain.reset()
+    scaled.reset()
+    for _ in range(2 * WINDOWS):
+        actions = drawn(plain, rng)
+        _, credit, _, _ = plain.step(actions)
+        _, reward, _, _ = scaled.step(actions)
+        for n, envs in enumerate(plain._envs):
+            its = credit[envs].astype(float)
+            total[n] = 0.999 * total[n] + np.sum(its**2)
+            count[n] = 0.999 * count[n] + np.count_nonzero(its)
+            if count[n]:
+                expected = its / np.sqrt(total[n] / count[n])
+                np.testing.assert_allclose(reward[envs], expected, rtol=1e-5, atol=1e-7)
+    assert len(set(np.round(total / count, 6))) == 4  # each has a scale of its own
+
+
+def test_batches_of_one_kind_share_its_scale():
+    _, env = several_kinds(credit_scaling="kind")
+    training, twice = several_kinds()
+    twice = GraphVecEnv(
+        replace(training, groups=8, credit_scaling="kind"), np.random.default_rng(1)
+    )
+    assert len(env.credit_scales) == len(twice.credit_scales) == 4
+    twice.reset()
+    rng = np.random.default_rng(2)
+    counts = np.zeros(4)
+    for _ in range(3):
+        _, reward, _, _ = twice.step(drawn(twice, rng))
+        counts *= 0.999**2
+        for n, envs in enumerate(twice._envs):
+            factor = 0.999 if n < 4 else 1.0  # the first batch counts as a window before
+            counts[n % 4] += factor * np.count_nonzero(reward[envs])
+    np.testing.assert_allclose([scale.count for scale in twice.credit_scales], counts)
+
+
 def mean_age(swarm, b):
     """Of all pairs of a mission, now (Eq. 10)."""
     return np.mean(swarm.now[b] - swarm.buffers.timestamp[b])

@@ -63,6 +63,24 @@ def test_means_are_those_of_the_missions_flown_one_by_one(sizes):
     assert attempted > 0
 
 
+def test_several_missions_are_judged_by_the_mean_over_their_kinds():
+    training = replace(small_training(sizes=(3, 6), held_out=2), silence_logit=1.0)
+    other = replace(training.mission, task="random-walk", range_ratio=1.0)
+    beside = replace(training, mission=other)
+    found = held_out_costs(replace(training, other_missions=(other,)), NETWORK)
+    apart = [held_out_costs(each, NETWORK) for each in (training, beside)]
+    assert apart[0].aoi != apart[1].aoi
+    assert found.aoi == pytest.approx(np.mean([each.aoi for each in apart]))
+    assert found.objective == pytest.approx(np.mean([each.objective for each in apart]))
+    references = fly_references(replace(training, other_missions=(other,)), lambda _share: None)
+    ages = references["aoi_tdma"]
+    assert [len(of_kind) for of_kind in ages] == [2] * 4
+    assert ages == [
+        *fly_references(training, lambda _share: None)["aoi_tdma"],
+        *fly_references(beside, lambda _share: None)["aoi_tdma"],
+    ]
+
+
 def test_eq17_flocks_are_judged_by_their_velocity_variance():
     its = {"features": "extended", "network": NETWORK.shape}
     training = small_training("team", "flocking", reward="velocity-variance", **its)

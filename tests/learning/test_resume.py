@@ -36,6 +36,10 @@ RESUMED = {
     "robot, discounted": {"discount": 0.9},
     "robot, walking, two sizes": {"task": "random-walk", "sizes": (4, 6)},
     "robot, lengths drawn": {"train_windows": (6, 15), "unknown_age": 20.0, "most_speech": 0.3},
+    "robot, several kinds": {
+        **{"sizes": (4, 6), "missions": 8, "groups": 4, "credit_scaling": "kind"},
+        "other_missions": (paper("flocking", num_windows=20, range_ratio=1.0, erasure=0.2),),
+    },
     "team, two sizes": {"credit": "team", "sizes": (4, 6)},
     "robot, two sizes, with a memory": {"sizes": (4, 6), "own_network": "tiny_networks:Counting"},
     "team, for the flock": {"credit": "team", "task": "flocking", "reward": "velocity-variance"},

@@ -97,6 +97,44 @@ def test_what_is_out_of_range_is_refused(changes, complaint):
         replace(small_training(), **changes)
 
 
+def test_kinds_are_each_mission_with_each_size_of_the_team():
+    first, second = paper("stationary", range_ratio=0.5), paper("flocking")
+    training = replace(usual_settings("robot", first, (10, 20)), other_missions=(second,))
+    assert training.all_missions == (first, second)
+    assert [(each.task, each.num_robots) for each in training.kinds] == [
+        ("stationary", 10),
+        ("stationary", 20),
+        ("flocking", 10),
+        ("flocking", 20),
+    ]
+    assert read_json(json.dumps(asdict(training)), Training) == training
+
+
+def test_other_missions_are_read_by_former_names_and_refuse_unknown_ones():
+    first, second = paper("stationary"), paper("stationary", failure_fraction=0.2)
+    training = replace(usual_settings("robot", first, (10,)), other_missions=(second,))
+    stored = asdict(training)
+    other = dict(stored["other_missions"][0])
+    other["switched_off"] = other.pop("failure_fraction")
+    assert read_json(json.dumps(stored | {"other_missions": [other]}), Training) == training
+    other["wings"] = 2
+    with pytest.raises(ValueError, match=r"unknown field `wings` - at `\$\.other_missions\[0\]`"):
+        read_json(json.dumps(stored | {"other_missions": [other]}), Training)
+
+
+def test_missions_that_cannot_be_trained_on_together_are_refused():
+    mission = paper("stationary")
+    usual = usual_settings("robot", mission, (40,))
+    with pytest.raises(ValueError, match="must have as many windows, not 500 and 400"):
+        replace(usual, other_missions=(replace(mission, num_windows=400),))
+    other = (reference("stationary"),)
+    assert replace(usual, other_missions=other).all_missions == (mission, *other)
+    with pytest.raises(ValueError, match="credit team takes one preset, not paper and reference"):
+        replace(usual_settings("team", mission, (40,)), other_missions=other)
+    with pytest.raises(ValueError, match="credit-scaling is of credits per robot; choose credit"):
+        replace(usual_settings("team", mission, (40,)), credit_scaling="kind")
+
+
 def test_unknown_teammates_count_in_credits_per_robot_alone():
     with pytest.raises(ValueError, match="unknown-age counts in credits per robot; choose credit"):
         replace(small_training("team"), unknown_age=20.0)
