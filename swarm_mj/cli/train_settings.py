@@ -42,7 +42,7 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "components.": (Components, GROUP),
     "mission.": (
         Mission,
-        "missions: each takes several values, trained on together; they multiply",
+        "missions: several values of each but --windows are trained on together; they multiply",
     ),
 }
 
@@ -67,7 +67,8 @@ def setting_options() -> Iterator[Option]:
         _, heading = PARTS[place.removesuffix(spec.name)]
         about = about_option(spec) if place.startswith("mission.") else meaning_of(spec)
         about = replace(about, group=heading, shown=_usual(place))
-        is_many = place.startswith("mission.")
+        # Of missions that are trained on together, all have as many windows.
+        is_many = place.startswith("mission.") and spec.name != "num_windows"
         yield Option(spec, about, place, is_many=is_many, is_nested=True)
 
 

@@ -74,9 +74,12 @@ def connected_positions(
         if np.all(part):
             return position_m
         is_kept = part & keeps_largest
+    reach = f"a range of {range_m:g} m"
+    if largest_part_at is not None:
+        reach += " in free space, which this channel changes,"
     raise ValueError(
-        f"no connected team in {num_draws} draws: {num_robots} robots with a range of {range_m:g} "
-        f"m are too sparse for {_area(half_side_m)}; raise the range ratio or the density"
+        f"no connected team in {num_draws} draws: {num_robots} robots with {reach} are too sparse "
+        f"for {_area(half_side_m)}; raise the range ratio or the density"
     )
 
 

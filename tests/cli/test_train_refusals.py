@@ -22,7 +22,6 @@ REFUSED = {
     "NEW --missions 16 --robots 4 5 6": "of the 3 kinds (team sizes by missions), not 16",
     "NEW --range-ratio 0.5 1 --missions 3": "of the 2 kinds (team sizes by missions), not 3",
     "NEW --credit-scaling all": "credit-scaling must be one of none, kind, not 'all'",
-    "NEW --windows 100 200": "must have as many windows, not 100 and 200",
     "NEW --credit team --preset paper reference": "credit team takes one preset, not paper and",
     "NEW --credit team --reward velocity-variance --task flocking stationary": "robots flock",
     "NEW --range-ratio 0.5 0.02": "too sparse",

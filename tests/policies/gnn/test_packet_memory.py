@@ -122,7 +122,7 @@ def test_ages_count_by_their_logarithm_whether_they_are_looked_up_or_not(age):
 
 
 @pytest.mark.parametrize("is_granted", [False, True])
-@pytest.mark.parametrize("others", [(), (0.3,), (-0.5, 499.9)])
+@pytest.mark.parametrize("others", [(), (0.3,), (-0.5,), (499.9,)])
 def test_ages_of_many_are_those_of_each(others, is_granted):
     """Of whole and half windows, the longest and never included, and of `others` between them."""
     now = 700.0
