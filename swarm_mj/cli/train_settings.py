@@ -42,7 +42,7 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "components.": (Components, GROUP),
     "mission.": (
         Mission,
-        "missions: several values of each but --windows are trained on together; they multiply",
+        "missions, trained on together for several values (not of --windows)",
     ),
 }
 
