@@ -10,6 +10,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
+from swarm_mj.policies.gnn.buffer_features import OwnBuffer
 from swarm_mj.policies.gnn.features import Feature, dtype_of, names_of
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import log_age
@@ -75,18 +76,6 @@ NODE = dtype_of(TurnNode)
 
 Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE`
 OwnNodes = Shaped[np.ndarray, "N"]  # those of one robot's graph
-
-
-class HeldNews(NamedTuple):
-    """One robot's buffer; k is a teammate, or the robot itself."""
-
-    timestamp: Float[np.ndarray, "N"]  # T^k [windows]
-    last_attempt: Float[np.ndarray, "N"]  # L^k [windows]
-    position_m: Float[np.ndarray, "N 2"]  # M^k
-    velocity_mps: Float[np.ndarray, "N 2"]  # M^k
-    parent: Int[np.ndarray, "N"]  # P^k
-    is_granted: bool  # whether it knew all states at t = 0
-    spoke: float  # when it last addressed anyone [windows]
 
 
 class Known(NamedTuple):
@@ -175,7 +164,7 @@ def _write_nodes(
     for b in range(num_missions):
         for i in range(num_robots):
             # One robot's nodes after the other's: they fit into the processor's nearest memory.
-            own = HeldNews(
+            own = OwnBuffer(
                 timestamp=timestamp[b, i],
                 last_attempt=last_attempt[b, i],
                 position_m=position_m[b, i],
@@ -206,7 +195,7 @@ def _last_spoken(last_attempt: Float[np.ndarray, "N"], i: int) -> float:
 
 
 @compiled(forceinline=True, makes_arrays=False)
-def _sort_known(own: HeldNews, i: int, per_m: float, known: Known) -> int:
+def _sort_known(own: OwnBuffer, i: int, per_m: float, known: Known) -> int:
     """Sort the robots that are known by their staleness; return how many there are."""
     num_known = 0
     for k in range(len(own.timestamp)):
@@ -248,7 +237,7 @@ def _write_due(
 
 
 @compiled(forceinline=True, makes_arrays=False)
-def _follow_parents(own: HeldNews, i: int, tree: Tree) -> None:
+def _follow_parents(own: OwnBuffer, i: int, tree: Tree) -> None:
     """Follow each teammate's news to the robot, from parent to parent."""
     tree.behind[:] = 0
     tree.hops[:] = 0
@@ -266,7 +255,7 @@ def _follow_parents(own: HeldNews, i: int, tree: Tree) -> None:
 
 @compiled(forceinline=True, makes_arrays=False)
 def _write_teammates(
-    own: HeldNews,
+    own: OwnBuffer,
     i: int,
     now: float,
     per_m: float,
@@ -304,7 +293,7 @@ def _write_teammates(
 
 @compiled(forceinline=True, makes_arrays=False)
 def _write_counts(
-    own: HeldNews,
+    own: OwnBuffer,
     i: int,
     now: float,
     known: Known,
@@ -378,7 +367,7 @@ def _write_place(
 
 
 @compiled(forceinline=True, makes_arrays=False)
-def is_known(own: HeldNews, i: int, k: int) -> bool:
+def is_known(own: OwnBuffer, i: int, k: int) -> bool:
     """Return whether robot i, whose buffer it is, knows of k."""
     return k == i or own.timestamp[k] > NEVER or own.is_granted
 
