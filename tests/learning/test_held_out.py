@@ -81,6 +81,14 @@ def test_several_missions_are_judged_by_the_mean_over_their_kinds():
     ]
 
 
+def test_evaluations_fly_with_the_bound_on_speech():
+    loud = replace(small_training(held_out=2), silence_logit=-50.0)
+    bounded = replace(loud, most_speech=1e-6)
+    # Outside their turns robots now speak at every chance, or hardly ever.
+    assert held_out_costs(bounded, NETWORK).packets_per_window < 1.1
+    assert held_out_costs(loud, NETWORK).packets_per_window > 3.0
+
+
 def test_eq17_flocks_are_judged_by_their_velocity_variance():
     its = {"features": "extended", "network": NETWORK.shape}
     training = small_training("team", "flocking", reward="velocity-variance", **its)
