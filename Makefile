@@ -11,7 +11,7 @@ SCALE ?= paper
 STUDIES ?=
 BUDGET ?= quick
 
-.PHONY: help setup setup-dev fly bench check same test test-all test-engines test-installs attack reference lock audit format results figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench check same test test-all test-engines test-installs attack reference lock audit format results leaderboard figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -26,6 +26,7 @@ help:
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
 	@echo "make results fly every table and figure of the docs, at one commit: hours; SCALE=smoke takes minutes"
+	@echo "make leaderboard  fly the benchmark and write training/leaderboard.md"
 	@echo "make figures draw all figures from training/results/"
 	@echo "make reproduce  train the paper's GNNs anew, then fly them; BUDGET=full has the authors' budget"
 	@echo "make video   remake the moving pictures (needs OpenGL, or libosmesa6)"
@@ -167,6 +168,9 @@ else
 	$(BIN)/python tools/results_table.py
 	$(MAKE) figures
 endif
+
+leaderboard: setup
+	$(BIN)/python tools/leaderboard.py
 
 figures: setup
 	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force

@@ -1,12 +1,13 @@
 """`swarm-mj study`: flies a study that is a file, or compares two results."""
 
 import tomllib
-from dataclasses import dataclass, fields
+from collections.abc import Iterable
+from dataclasses import dataclass, fields, replace
 from pathlib import Path
 from typing import Any, ClassVar, get_origin
 
 from swarm_mj.cli.evaluate import StudyFlags, run_study
-from swarm_mj.cli.mission_options import missions_given
+from swarm_mj.cli.mission_options import OTHERS, missions_given
 from swarm_mj.cli.options import Given
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, MAX_REGIMES, Study
 from swarm_mj.mission import Mission
@@ -47,6 +48,14 @@ class StudyOptions(StudyFlags):
         reads=lambda name: [Path(name)],
         is_positional=True,
     )
+    policy: tuple[str, ...] = setting(
+        (),
+        f"fly these in place of the study's policies: names that `swarm-mj policies` prints, all "
+        f"of them, {OTHERS}",
+        metavar="NAME",
+        shown="the study's",
+        reads=registry.files_of,
+    )
     trust: bool = setting(
         False, "run the code that the study names, as module:Name; look at it before"
     )
@@ -59,7 +68,8 @@ def run(options: StudyOptions) -> int:
     if len(named) != len(TAKES[action].split()):
         raise ValueError(f"study {action} takes {TAKES[action]}, not {' '.join(named)}")
     if action == "run":
-        return run_study(options, read_study(*named, is_trusted=options.trust))
+        study = read_study(*named, is_trusted=options.trust)
+        return run_study(options, flown_by(study, options.policy) if options.policy else study)
     if options != StudyOptions(action=action, named=named):
         raise ValueError("study compare prints what it finds; leave out the options")
     need("scipy", "a comparison")
@@ -75,6 +85,16 @@ def run(options: StudyOptions) -> int:
             title = f"{cost.column}, means over missions, with 95 % intervals"
             plain_console().print(f"{title}\n{table}\n")
     return DONE
+
+
+def flown_by(study: Study, policies: Iterable[str]) -> Study:
+    """Return a study of the same missions by other policies.
+
+    They are compared with its baseline if that is among them, else with the first of them.
+    """
+    listed = tuple(registry.listed(policies))
+    baseline = study.compared_to if study.compared_to in listed else None
+    return replace(study, policies=listed, baseline=baseline)
 
 
 def read_study(name: str, *, is_trusted: bool = False) -> Study:

@@ -6,7 +6,7 @@ import pandas as pd
 import pytest
 
 from swarm_mj.cli import parse
-from swarm_mj.cli.study import read_study
+from swarm_mj.cli.study import flown_by, read_study
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import POLICIES
 from swarm_mj.system.packages import asset
@@ -84,6 +84,21 @@ def test_tables_of_missions_follow_each_other_and_override_what_they_share(read)
 def test_fields_that_are_no_options_can_be_set_and_swept(read):
     regimes = read("[mission]\npreset = 'reference'\nmax_acceleration_mps2 = [5, 10]\n").regimes
     assert regimes == tuple(reference(max_acceleration_mps2=x) for x in (5.0, 10.0))
+
+
+def test_other_policies_may_fly_a_studys_missions(succeed, refusal, tmp_path):
+    (tmp_path / "s.toml").write_text(SMALL + MISSION)
+    succeed("study", "run", "s.toml", "--policy", "tdma", "aloha", "--json", "other.json")
+    header = json.loads((tmp_path / "other.json").read_text())["study"]
+    assert header["policies"] == ["tdma", "aloha"]
+    refused = refusal("study", "run", "s.toml", "--policy", "tmda")
+    assert "did you mean tdma?" in refused
+
+
+def test_other_policies_are_compared_with_the_studys_baseline_if_they_have_it(read):
+    study = read(SMALL + "baseline = 'round-robin'\n" + MISSION)
+    assert flown_by(study, ["mst", "round-robin", "tdma"]).compared_to == "round-robin"
+    assert flown_by(study, ["mst", "tdma"]).compared_to == "mst"
 
 
 def test_all_is_every_policy(read):
