@@ -155,7 +155,7 @@ PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN gen
   "GNN trained at each size" "GNN generalized from 40" \
   "GNN trained on AoI" "GNN trained on velocity variance"
 OURS := planner "planner --payload none" sotdma age-gain-csma gnn spatial-tdma tdma gossip csma aloha random-flooding \
-  greedy-oracle
+  greedy-oracle lookahead-oracle
 
 # STUDIES="city channels" flies these tables only; an interrupted run continues.
 results: setup
@@ -179,7 +179,8 @@ figures: setup
 	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv 2>/dev/null) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
-	$(BIN)/swarm-mj figures training/results/paper-*.csv --figure fig5 fig6 --policy $(OURS) \
+	$(BIN)/swarm-mj figures training/results/paper-*.csv training/results/lookahead.csv \
+	  --figure fig5 fig6 --policy $(OURS) \
 	  --out assets/figures/policies --force
 	$(BIN)/python training/convergence_figure.py
 	$(BIN)/python training/limits_figure.py

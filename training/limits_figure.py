@@ -4,7 +4,7 @@
 
 Draws assets/figures/policies/fig4.svg and .png from `training/results/`: the package's policies,
 the floor of `bounds.py`, proven for every policy, and the schedules of `ceiling.py`. Also makes the
-tables of `docs/bounds.md` from the same results.
+tables of `docs/bounds.md`, from the same results and from those of `lookahead-oracle`.
 """
 
 import math
@@ -21,9 +21,11 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
 from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.missions_table import read_missions
 from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
+from swarm_mj.evaluation.samples import standard_error
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
 from swarm_mj.system.writing import Output, check_outputs
@@ -35,6 +37,53 @@ FIGURE = RESULT_FIGURES["fig4"]
 METHODS = (
     *("planner", "planner --payload none", "gnn", "spatial-tdma", "tdma", "gossip", "aloha"),
     *("random-flooding", "sotdma", "age-gain-csma"),
+)
+
+
+LOOKAHEAD, GREEDY = "lookahead-oracle", "greedy-oracle"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Compared:
+    """Missions on which both oracles have flown."""
+
+    head: str
+    lookahead: str  # the results, without an ending
+    greedy: str
+    where: dict[str, float | str]  # of the missions that these files have
+
+
+COMPARED = (
+    Compared(
+        head="40 at rest, range ratio 0.25",
+        lookahead="lookahead",
+        greedy="paper-stationary",
+        where={"task": "stationary", "range_ratio": 0.25},
+    ),
+    Compared(
+        head="40 walking",
+        lookahead="lookahead",
+        greedy="paper-random-walk",
+        where={"task": "random-walk", "num_robots": 40},
+    ),
+    Compared(
+        head="80 walking",
+        lookahead="lookahead",
+        greedy="paper-random-walk",
+        where={"task": "random-walk", "num_robots": 80},
+    ),
+    Compared(
+        head="40 flocking, velocity ratio 0.15",
+        lookahead="lookahead",
+        greedy="paper-flocking",
+        where={"task": "flocking", "velocity_ratio": 0.15},
+    ),
+    Compared(
+        head="20 at rest among `blocks`",
+        lookahead="lookahead-blocks",
+        greedy="lookahead-blocks",
+        where={"task": "stationary", "num_robots": 20},
+    ),
 )
 
 
@@ -109,6 +158,51 @@ def table(folder: Path) -> str:
         ["searched schedule / planner", *(f"{its.mean / ours.mean:.2f}" for its, ours in both)],
     ]
     return _markdown(rows)
+
+
+def oracles_table(folder: Path) -> str:
+    """Return both oracles' costs and their differences, as Markdown for docs/bounds.md.
+
+    Raises ValueError if they have not flown the same missions.
+    """
+    costs = (("age", "aoi", 2), ("velocity variance", "velocity_variance", 4))
+    heads = []
+    for label, _, _ in costs:
+        heads += [f"{label}, `{LOOKAHEAD}`", f"`{GREEDY}`", "difference"]
+    rows = [["missions", *heads], ["---"] * (len(heads) + 1)]
+    for compared in COMPARED:
+        row = [compared.head]
+        for _, column, digits in costs:
+            if column == "aoi" or compared.where["task"] == "flocking":
+                row += _both(compared, folder, column, digits)
+            else:
+                row += [""] * 3
+        rows.append(row)
+    return _markdown(rows)
+
+
+def _both(compared: Compared, folder: Path, column: str, digits: int) -> list[str]:
+    """Return both oracles' costs and the difference, pair by pair, with standard errors."""
+    ahead = _by_seed(folder / f"{compared.lookahead}.parquet", LOOKAHEAD, compared, column)
+    greedy = _by_seed(folder / f"{compared.greedy}.parquet", GREEDY, compared, column)
+    if not ahead or ahead.keys() != greedy.keys():
+        raise ValueError(f"both oracles must have flown the same missions of {compared.head}")
+    pairs = [(ahead[seed], greedy[seed]) for seed in ahead]
+    both = np.array(pairs)
+    cells: list[str] = []
+    for costs in (both[:, 0], both[:, 1], both[:, 0] - both[:, 1]):
+        sem = standard_error(costs)
+        cells.append(f"{np.mean(costs):.{digits}f} ± {math.nan if sem is None else sem:.{digits}f}")
+    return cells
+
+
+def _by_seed(path: Path, policy: str, compared: Compared, column: str) -> dict[int, float]:
+    """Return a policy's costs by the missions' seeds."""
+    rows = read_missions(path)
+    rows = rows[rows["policy"] == policy]
+    for name, value in compared.where.items():
+        rows = rows[rows[name] == value]
+    return dict(zip(rows["seed"].tolist(), rows[column].tolist(), strict=True))
 
 
 class _Age(NamedTuple):

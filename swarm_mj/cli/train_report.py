@@ -9,6 +9,7 @@ from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import (
     ORACLE,
+    ORACLES,
     REFERENCES,
     Choice,
     Cost,
@@ -126,8 +127,8 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
 
 def _comparison(run: TrainingRun, other: str, cost: Cost) -> Iterator[str]:
     """Yield a sentence about another policy, unless the policy kept clearly beats it."""
-    # Nobody expects it to reach the oracle, which knows everything.
-    if other == ORACLE or (cost.behind <= 0.0 and is_clear(cost) is not False):
+    # Nobody expects it to reach an oracle, which knows everything.
+    if other in ORACLES or (cost.behind <= 0.0 and is_clear(cost) is not False):
         return
     yield f"The policy kept {difference(other, cost, run.training.cost)} on the same missions."
 

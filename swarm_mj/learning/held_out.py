@@ -112,7 +112,7 @@ def evaluate(
     flown = flights.fly(flies, HELD_OUT_SEED, training.held_out)
     ages = _samples(flown, AOI)
     behind: Columns = {}
-    for name in selection.REFERENCES:
+    for name in selection.COMPARED:
         theirs = (references or {}).get(selection.column(AOI, name))
         if theirs is not None:
             compared = _compared([np.array(each) for each in theirs], ages)

@@ -66,7 +66,7 @@ def training_curve(training: Training, rows: Sequence[CurveRow]) -> "TrainingCur
     if cost is AOI:  # evaluations tell the error of the age alone
         sems = [row.costs.aoi_sem or 0.0 for row in rows]
     references: dict[str, float] = {}
-    for name in selection.REFERENCES:
+    for name in selection.COMPARED:
         its = rows[-1].references.get(selection.column(cost, name))
         if its is not None:
             references[name] = its

@@ -14,14 +14,18 @@ from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, MissionCost
 from swarm_mj.system.writing import write_csv
 
-ORACLE = "greedy-oracle"
+ORACLE = "lookahead-oracle"
 # Policies without a payload or training, and what each knows.
 REFERENCES = {
     "tdma": "robots take turns that were agreed beforehand",
     "spatial-tdma": "robots that believe themselves far apart share a turn",
     ORACLE: "knows where all robots are and what they know",
 }
-# The oracle does not fly larger teams: a window takes it 0.7 ms at 40 robots, 35 ms at 200.
+# Of runs that began with 1.0: they are compared with it as before, also when they are resumed.
+FORMER_ORACLE = "greedy-oracle"
+COMPARED = (*REFERENCES, FORMER_ORACLE)  # what a learning curve may have costs of
+ORACLES = (ORACLE, FORMER_ORACLE)
+# The oracle does not fly larger teams: a window takes it 1 ms at 40 robots, 26 ms at 200.
 ORACLE_ROBOTS = 100
 NUM_BEST = 3  # evaluations whose policies are flown again
 OTHER_FLIGHTS = 2 + len(REFERENCES)  # at the end: the one that is kept, again, and the first
@@ -56,7 +60,7 @@ class CurveRow:
     decisions: int  # of teams, before it
     minutes: float  # before its end
     costs: HeldOutCosts
-    # Costs of `REFERENCES`, such as `aoi_tdma`, and how far behind them it is, `aoi_behind_tdma`.
+    # Costs of `COMPARED`, such as `aoi_tdma`, and how far behind them it is, `aoi_behind_tdma`.
     references: Columns = field(default_factory=dict)
     training: Columns = field(default_factory=dict)  # since the last one: `rollout/aoi` and others
 
@@ -213,14 +217,14 @@ def objective_of(evaluation: CurveRow) -> float:
 
 
 def column(cost: MissionCost, name: str) -> str:
-    """Return the learning curve's column for a cost of a policy of `REFERENCES`."""
+    """Return the learning curve's column for a cost of a policy of `COMPARED`."""
     return f"{cost.column}_{name}".replace("-", "_")
 
 
 def reference_ages(row: Mapping[str, float]) -> dict[str, float]:
-    """Return the ages of those of `REFERENCES` that a row has, by their names [windows]."""
+    """Return the ages of those of `COMPARED` that a row has, by their names [windows]."""
     ages: dict[str, float] = {}
-    for name in REFERENCES:
+    for name in COMPARED:
         age = row.get(column(AOI, name))
         if age is not None:
             ages[name] = age
@@ -228,7 +232,7 @@ def reference_ages(row: Mapping[str, float]) -> dict[str, float]:
 
 
 def behind_column(name: str) -> str:
-    """Return the curve's column for how much older than one of `REFERENCES` a policy's news is."""
+    """Return the curve's column for how much older than one of `COMPARED` a policy's news is."""
     return column(AOI, f"behind {name}".replace(" ", "_"))
 
 

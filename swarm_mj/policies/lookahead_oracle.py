@@ -1,10 +1,10 @@
 """The lookahead oracle: a scheduler that knows all buffers and positions, and plans ahead.
 
-A team could not fly it; it is the reference for how low the age of information can go where robots
-move. In every slot it follows several first transmitters for some slots, by the planner's own
-scheduler (`broadcast_scheduler`), and tells the robots of the one that leaves the team youngest to
-transmit. The planner's robots schedule from what they believe of the team. Here T and the links are
-the true ones of each slot, so nothing is lost to beliefs that differ or are old.
+A team could not fly it; it is the reference for how low the age of information can go. In every
+slot it follows several first transmitters for some slots, by the planner's own scheduler
+(`broadcast_scheduler`), and chooses the one that leaves the team youngest. The planner's robots
+schedule from what they believe of the team. Here T and the links are the true ones of each slot, so
+nothing is lost to beliefs that differ or are old.
 
 It is not optimal: a branch has few slots, in which robots stand still, and the scheduler is greedy
 within each. Over uncertain links packets decode with a probability, as in `greedy_oracle`.
@@ -60,7 +60,7 @@ class _Scene:
 
 
 class LookaheadOracle(CentralisedPolicy):
-    """Plans broadcasts some slots ahead; the least age known where robots move.
+    """Plans broadcasts some slots ahead; not optimal.
 
     Centralised: it sees all buffers and all true positions, and tells every robot at no cost.
     """
@@ -75,8 +75,10 @@ class LookaheadOracle(CentralisedPolicy):
         ),
         beyond=(Information.TRUE_POSITIONS, Information.ALL_BUFFERS, Information.TRUE_CHANNEL),
         payload=None,
-        look=Look(label="lookahead-oracle", colour="#000000", marker="x", line_width=0.8),
-        memory=PairMemory(bytes_per_pair=150.0),
+        look=Look(
+            label="lookahead-oracle", colour="#aa55ff", marker="p", marker_size=5.0, line_width=0.8
+        ),
+        memory=PairMemory(bytes_per_pair=80.0),
     )
 
     @classmethod

@@ -17,7 +17,7 @@ from swarm_mj.policies.tuning import tuned_probability
 
 ROOT = Path(__file__).parents[2]
 MISSION = paper("flocking")
-CENTRALISED = {"round-robin", "mst", "greedy-oracle"}
+CENTRALISED = {"round-robin", "mst", "greedy-oracle", "lookahead-oracle"}
 REQUEST = {"round-robin", "mst", "gnn", "greedy-oracle"}
 
 

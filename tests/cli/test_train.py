@@ -55,7 +55,7 @@ def test_a_run_prints_its_evaluations_and_what_it_came_to(whole):
     for line, decisions in zip(lines, (0, 128, 256), strict=True):
         assert line.split()[:2] == [f"{decisions}", "decisions"]
         assert "held-out age" in line
-    for row in ("policy kept", "spatial-tdma", "greedy-oracle", "decisions", "minutes"):
+    for row in ("policy kept", "spatial-tdma", "lookahead-oracle", "decisions", "minutes"):
         assert row in done.stdout
     assert "runs/whole: credit per robot, stationary, 4 robots" in done.stdout
 

@@ -128,7 +128,7 @@ def test_over_a_custom_channel_there_is_no_floor():
     ("name", "task", "failing"),
     [
         *((name, "random-walk", 0.0) for name in ("random-flooding", "planner", "greedy-oracle")),
-        *((name, "random-walk", 0.4) for name in ("mst", "tdma")),
+        *((name, "random-walk", 0.4) for name in ("mst", "tdma", "lookahead-oracle")),
         *(("mst", "stationary", 0.0), ("mst", "flocking", 0.0)),
     ],
 )

@@ -165,7 +165,7 @@ def test_the_least_cost_on_fresh_missions_is_chosen_and_told_on_others():
     assert choice.kept.mean == pytest.approx(told.mean()) == pytest.approx(costs.aoi)
     assert choice.kept.sem == pytest.approx(told.std(ddof=1) / np.sqrt(3))
     assert (choice.num_finalists, choice.num_missions, choice.run_decisions) == (3, 3, 128)
-    for name in ("tdma", "spatial-tdma", "greedy-oracle"):
+    for name in ("tdma", "spatial-tdma", "lookahead-oracle"):
         other = ages(make_policy(name, TRAINING.mission), TEST_SEED)
         behind = told - other
         cost = choice.others[name]
@@ -212,7 +212,7 @@ def test_the_first_flies_beside_what_was_chosen_if_it_is_another():
     first = ages(flies(NETWORKS[0]), TEST_SEED)
     assert choice.others["first"].mean == pytest.approx(first.mean())
     only, _ = choose(TRAINING, CURVE[:1], NETWORKS, lambda _share: None)
-    assert set(only.others) == {"tdma", "spatial-tdma", "greedy-oracle"}
+    assert set(only.others) == {"tdma", "spatial-tdma", "lookahead-oracle"}
     assert only.kept.mean == pytest.approx(first.mean())
 
 
@@ -245,12 +245,19 @@ def test_all_references_fly_the_held_out_missions_and_the_oracle_no_large_teams(
     training = replace(TRAINING, held_out=6)
     columns = reference_columns(fly_references(training, lambda _share: None))
     six = [("tdma", HELD_OUT_SEED, 6), ("spatial-tdma", HELD_OUT_SEED, 6)]
-    assert flown == [*six, ("greedy-oracle", HELD_OUT_SEED, 6)]
-    assert "aoi_greedy_oracle" in columns
+    assert flown == [*six, ("lookahead-oracle", HELD_OUT_SEED, 6)]
+    assert "aoi_lookahead_oracle" in columns
     large = replace(training, robots=(4, 101))
     columns = reference_columns(fly_references(large, lambda _share: None))
     assert flown[3:] == six
-    assert "aoi_greedy_oracle" not in columns
+    assert "aoi_lookahead_oracle" not in columns
+
+
+def test_a_resumed_run_is_still_compared_with_the_oracle_that_it_began_with():
+    """Runs of 1.0 have flown the greedy oracle."""
+    training = small_training(sizes=(4,), held_out=2)
+    _, columns = evaluate(training, NETWORK, {"aoi_greedy_oracle": [[7.0, 6.0]]})
+    assert columns.keys() == {"aoi_behind_greedy_oracle", "aoi_behind_greedy_oracle_sem"}
 
 
 def test_an_evaluation_is_compared_mission_by_mission():

@@ -74,7 +74,7 @@ def test_each_evaluation_is_a_flight_beside_the_curve_so_far(viewer, tmp_path):
         assert about == f"# after {row.decisions} decisions"
         references = [
             f"{name} {row.references[f'aoi_{name}'.replace('-', '_')]:.2f}"
-            for name in ("tdma", "spatial-tdma", "greedy-oracle")
+            for name in ("tdma", "spatial-tdma", "lookahead-oracle")
         ]
         assert names == [f"policy in training {row.costs.aoi:.2f}", *references]
         assert "/scene/robots" in entities(path)

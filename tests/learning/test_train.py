@@ -181,7 +181,7 @@ def test_hand_written_policies_fly_once_and_are_flat_curves(whole):
     assert len(flown) == 3 * TRAINING.mission.num_windows
     seeds = range(HELD_OUT_SEED, HELD_OUT_SEED + TRAINING.held_out)
     events = EventAccumulator(str(folder / TENSORBOARD)).Reload()
-    for name in ("tdma", "spatial-tdma", "greedy-oracle"):
+    for name in ("tdma", "spatial-tdma", "lookahead-oracle"):
         swarm = Swarm(TRAINING.mission, seeds)
         summary = summarise(list(rollout(swarm, make_policy(name, TRAINING.mission))))
         column = f"aoi_{name.replace('-', '_')}"

@@ -17,7 +17,7 @@ from swarm_mj.radio.carrier_sensing import Contention
 from swarm_mj.simulation.swarm import Swarm
 
 MISSION = paper("flocking", num_robots=8)
-CENTRALISED = ["round-robin", "mst", "greedy-oracle"]
+CENTRALISED = ["round-robin", "mst", "greedy-oracle", "lookahead-oracle"]
 DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
 SENSING = ["csma", "age-gain-csma"]  # robots of these also know what they sense
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these

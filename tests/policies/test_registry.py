@@ -8,6 +8,7 @@ from swarm_mj.policies.carrier_sense import AgeGainCsma, CarrierSense
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
 from swarm_mj.policies.learned import LearnedPolicy
+from swarm_mj.policies.lookahead_oracle import LookaheadOracle
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
@@ -115,6 +116,7 @@ KINDS = {
     "planner": Planner,
     "planner --payload none": SpatialTdma,
     "greedy-oracle": GreedyOracle,
+    "lookahead-oracle": LookaheadOracle,
 }
 
 

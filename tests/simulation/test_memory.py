@@ -26,6 +26,7 @@ MISSION = paper("random-walk", num_robots=10, num_windows=16)
         ("sotdma", 230.0),
         ("planner", 250.0 + 4.0 * 10),
         ("greedy-oracle", 60.0),
+        ("lookahead-oracle", 80.0),
     ],
 )
 def test_tables_grow_with_pairs_and_missions_and_by_what_the_policy_says(policy, own_pair):

@@ -2,7 +2,7 @@
 
 Hues are Okabe and Ito's and Tol's, which remain distinct for colour-blind readers; markers differ
 too. Our curves are solid and filled, published ones dashed and hollow, in the same colour. The
-oracle, which no team could fly, is black and thin.
+oracles, which no team could fly, are thin.
 """
 
 import io
