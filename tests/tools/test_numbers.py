@@ -17,8 +17,9 @@ CODE = re.compile(r"^( *)```.*?^\1```$", re.MULTILINE | re.DOTALL)
 BY_HAND = re.compile(r"±|\bcommit `?[0-9a-f]{7,}")
 # These show no result: they chose the weights that are shipped, and constants of a policy.
 HISTORY = {RESULTS / "learning", RESULTS / "classics-tuning.csv"}
-# Tables of what older code did not measure: the next release flies all at one commit again.
-NEWER = {RESULTS / f"converging{what}.csv" for what in ("", "-courses", "-late", "-teams")}
+# Tables of what older code did not measure or fly: the next release flies all at one commit again.
+CONVERGING = {RESULTS / f"converging{what}.csv" for what in ("", "-courses", "-late", "-teams")}
+LOOKAHEAD = {RESULTS / "lookahead.csv", RESULTS / "lookahead-blocks.csv"}
 
 
 def test_the_pages_have_the_numbers_of_the_results():
@@ -61,13 +62,13 @@ def commits_of(paths):
     return commits
 
 
-def test_all_results_are_of_one_clean_commit_and_newer_tables_of_another():
+def test_all_results_are_of_one_clean_commit_and_each_kind_of_newer_tables_of_another():
     released = []
     for path in sorted(RESULTS.rglob("*.csv")):
-        is_apart = (HISTORY | NEWER) & {path, *path.parents}
+        is_apart = (HISTORY | CONVERGING | LOOKAHEAD) & {path, *path.parents}
         if not is_apart:
             released.append(path)
-    for paths in (released, sorted(NEWER)):
+    for paths in (released, sorted(CONVERGING), sorted(LOOKAHEAD)):
         commits = commits_of(paths)
         assert len(commits) == 1, commits
         assert re.fullmatch("[0-9a-f]{12}", *commits)

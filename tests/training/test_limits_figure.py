@@ -4,8 +4,19 @@ import numpy as np
 import pytest
 from synthetic import result
 
+import swarm_mj
+from swarm_mj.evaluation.missions_table import write_missions
 from swarm_mj.evaluation.results_files import write_results
-from training.limits_figure import draw_limits, exact_table, read_floor, table
+from swarm_mj.mission import paper
+from training import limits_figure
+from training.limits_figure import (
+    Compared,
+    draw_limits,
+    exact_table,
+    oracles_table,
+    read_floor,
+    table,
+)
 
 HEADER = "range_ratio,floor_windows,commit\n"
 
@@ -87,3 +98,55 @@ def test_small_teams_stand_in_a_table_of_their_own(tmp_path):
     _, _, team, _, origin = exact_table(tmp_path).splitlines()
     assert team == "| two | 0.125 | 0.250 | 0.50 |"
     assert "commit abcdef012345." in origin
+
+
+@pytest.fixture
+def oracles(tmp_path, monkeypatch):
+    """Both oracles' costs of three flights, whose other order in one file must not matter."""
+    mission = paper("flocking", num_robots=5, num_windows=8)
+    fields = {"lookahead": "ahead", "greedy": "greedy"}
+    where = {"task": "flocking", "num_robots": 5}
+    compared = Compared(head="five", **fields, where=where)
+    at_rest = Compared(head="rest", **fields, where=where | {"task": "stationary"})
+    monkeypatch.setattr(limits_figure, "COMPARED", (compared, at_rest))
+    rest = paper("stationary", num_robots=5, num_windows=8)
+    costs = {}
+    for file, name in (("ahead", "lookahead-oracle"), ("greedy", "greedy-oracle")):
+        flown = [
+            *swarm_mj.evaluate((name, "tdma"), mission, num_missions=3, seed=4).results,
+            *swarm_mj.evaluate((name,), rest, num_missions=3, seed=4).results,
+        ]
+        write_missions(tmp_path / f"{file}.parquet", flown)
+        costs[file] = [flown[0].aoi, flown[0].velocity_variance, flown[2].aoi]
+    return tmp_path, costs
+
+
+def cells(ahead, greedy, digits):
+    """Two means and that of the differences, with their standard errors."""
+    a = np.array(ahead)
+    b = np.array(greedy)
+    return [
+        f"{each.mean():.{digits}f} ± {each.std(ddof=1) / np.sqrt(3):.{digits}f}"
+        for each in (a, b, a - b)
+    ]
+
+
+def test_oracles_are_compared_mission_by_mission(oracles):
+    folder, costs = oracles
+    heads, _, flocks, rest = (
+        [cell.strip() for cell in line.strip("|").split("|")]
+        for line in oracles_table(folder).splitlines()
+    )
+    assert heads[:4] == ["missions", "age, `lookahead-oracle`", "`greedy-oracle`", "difference"]
+    age, variance, age_at_rest = zip(*costs.values(), strict=True)
+    assert flocks == ["five", *cells(*age, 2), *cells(*variance, 4)]
+    assert rest == ["rest", *cells(*age_at_rest, 2), "", "", ""]
+
+
+def test_oracles_that_flew_other_missions_are_not_compared(oracles):
+    folder, _ = oracles
+    mission = paper("flocking", num_robots=5, num_windows=8)
+    flown = swarm_mj.evaluate(("greedy-oracle",), mission, num_missions=3, seed=5).results
+    write_missions(folder / "greedy.parquet", flown)
+    with pytest.raises(ValueError, match="both oracles must have flown the same missions of five"):
+        oracles_table(folder)
