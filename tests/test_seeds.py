@@ -22,8 +22,8 @@ TUNING = {"training/results/classics-tuning.csv"}  # no result: it says what was
 
 # Results and studies with missions that chose something. No file may join them, and what is mended
 # leaves them. The reason is the same for all: tables are flown anew at the next release. Only those
-# of lookahead-oracle did join: its rows stand in these tables, pair by pair, so they are of the same
-# missions; none of its own choices is among them.
+# of lookahead-oracle did join: its rows stand in these tables, pair by pair, so they are of the
+# same missions; none of its own choices is among them.
 DEBTS = {
     "assets/studies/bandwidth.toml",
     "assets/studies/impairments-small.toml",

@@ -41,7 +41,7 @@ WEIGHED_SLOTS = 20
 
 @dataclass(frozen=True, kw_only=True)
 class _Scene:
-    """What one mission's last slot was scheduled by."""
+    """The problem of one mission's last slot, and all that tells whether it is still the same."""
 
     position_m: Float[np.ndarray, "N 2"]  # of its links
     weighed_m: Float[np.ndarray, "N 2"]  # where robots were when its weights were worked out [m]

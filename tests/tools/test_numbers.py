@@ -79,5 +79,7 @@ def test_the_tables_can_be_made_from_what_make_results_makes(tmp_path):
     for name in (*STUDIES, *OTHERS, *beside):  # `gnn` has a folder
         if name != "gnn":
             copy(RESULTS / f"{name}.csv", tmp_path)
+    for name in STUDIES:
+        copy(RESULTS / f"{name}.parquet", tmp_path)
     copytree(RESULTS / "reproduce", tmp_path / "reproduce")
     assert main(["--structure", "--results", str(tmp_path)]) == DONE
