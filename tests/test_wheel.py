@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 from packaging.requirements import Requirement
 
-from swarm_mj.system.packages import CORE
+from swarm_mj.system.packages import CORE, commit
 
 pytestmark = pytest.mark.slow
 ROOT = Path(__file__).parent.parent
@@ -71,6 +71,13 @@ def test_assets_come_from_the_wheel(installed, tmp_path):
     code = "from swarm_mj.system.packages import asset; print(asset('arena.xml'))"
     done = run(tmp_path, [installed], "-c", code)
     assert done.stdout.strip() == str(installed / "swarm_mj" / "assets" / "arena.xml")
+
+
+def test_the_commit_is_that_of_the_checkout_that_was_built(installed, tmp_path):
+    code = "from swarm_mj.system.packages import commit; print(commit())"
+    done = run(tmp_path, [installed], "-c", code)
+    assert done.stdout.strip().rstrip("+") == str(commit()).rstrip("+")
+    assert commit() is not None
 
 
 def test_it_flies_the_shipped_network_and_leaves_a_replay(installed, tmp_path):

@@ -58,10 +58,15 @@ def code_digest() -> str:
 
 
 def commit() -> str | None:
-    """Return the checkout's commit, with `+` if the package differs; None outside a checkout."""
-    checkout = Path(__file__).resolve().parents[2]
+    """Return the commit of the code, with `+` if the package differs; None if it is not known.
+
+    It is the checkout's, or that which `tools/store_commit.py` stored when the package was built.
+    """
+    package = Path(__file__).resolve().parents[1]
+    checkout = package.parent
     if not (checkout / ".git").exists():
-        return None
+        stored = package / "COMMIT"
+        return stored.read_text(encoding="utf-8").strip() if stored.exists() else None
 
     def git(*arguments: str) -> str:
         command = ["git", "-C", str(checkout), *arguments]

@@ -69,6 +69,14 @@ def test_version_and_commit_are_the_installed_one_and_git_s_own():
     assert head.startswith(str(commit()).rstrip("+"))
 
 
+def test_outside_a_checkout_the_commit_is_that_of_the_build(package):
+    assert commit() is None
+    (package / "COMMIT").write_text("0123456789ab+\n")
+    assert commit() == "0123456789ab+"
+    subprocess.run(["git", "-C", package.parent, "init", "--quiet"], check=True)
+    assert commit() is None  # of a repository without a commit; that of the build is another's
+
+
 @pytest.fixture
 def package(tmp_path, monkeypatch):
     """Another checkout's package, in place of this one; no repository yet."""
