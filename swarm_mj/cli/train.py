@@ -25,7 +25,7 @@ from swarm_mj.system.fields import common_setting, files_read, same_as, setting,
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.terminal import named_values, plain_console, tell_cores, this_command
-from swarm_mj.system.user_code import files_named
+from swarm_mj.system.user_code import files_named, load
 from swarm_mj.system.writing import Output, check_outputs
 
 ONE_LIVE = "--live shows one training; leave it out of a --sweep"
@@ -179,6 +179,8 @@ def asked_run(options: TrainOptions) -> TrainingRun:
     is_shown = options.live is not None
     needs = run_folder.training_needs(run.training, run.limits, is_shown=is_shown)
     check_fits(needs, options.out, "choose fewer --missions or --robots", is_forced=options.yes)
+    if options.logger:  # before a long start; and what is loaded travels to other machines
+        load("logger", options.logger)
     return run
 
 

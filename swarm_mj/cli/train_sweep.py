@@ -1,11 +1,9 @@
 """`swarm-mj train --sweep FILE.toml`: a training for each combination of values in a file."""
 
-import io
 import shlex
-import sys
+import tempfile
 import tomllib
 from collections.abc import Sequence
-from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -13,13 +11,14 @@ from typing import Any
 
 from rich.console import Console
 
-from swarm_mj.cli import parse
+from swarm_mj.cli import NAME, parse
 from swarm_mj.evaluation.engines import Engine
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_curve
 from swarm_mj.protocol.mission_costs import AOI
 from swarm_mj.system.arguments import check_kind, check_names
-from swarm_mj.system.exit_codes import DONE, INTERRUPTED
+from swarm_mj.system.exit_codes import BAD_INPUT, DONE, FAILED, INTERRUPTED
 from swarm_mj.system.fields import as_typed
+from swarm_mj.system.processes import PYTHON, running
 from swarm_mj.system.reading import read_file
 from swarm_mj.system.streams import check_printable
 from swarm_mj.system.terminal import WorkBar, plain_console, this_command
@@ -27,6 +26,7 @@ from swarm_mj.system.terminal import WorkBar, plain_console, this_command
 MAX_BYTES = 1_000_000
 MAX_TRAININGS = 1000
 NOT_IN_FILES = ("out", "resume", "sweep", "jobs", "engine", "address")  # of the command line alone
+OWN_ENDS = (DONE, FAILED, BAD_INPUT, INTERRUPTED)  # exit codes of a training that ended by itself
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -119,36 +119,47 @@ def run_sweep(path: Path, out: Path, engine: Engine, *, is_resumed: bool) -> int
             raise ValueError(f"sweep {path}: {ONE_LIVE}")
         asked_run(asked)  # whatever is wrong is said before anything is trained
         commands.append(command)
-    # A training that is done in this process takes the standard streams for itself.
-    console = Console(file=sys.stderr, highlight=False, soft_wrap=True)
-    failed: list[str] = []
+    console = Console(stderr=True, highlight=False, soft_wrap=True)
+    failed: dict[int, str] = {}  # the names of runs, by their places in the sweep
     bar = WorkBar("Training", len(commands), "trainings", console=console)
-    with bar:
-        for number, (index, outcome) in enumerate(engine.run(train_quietly, commands), start=1):
-            folder = Path(commands[index][commands[index].index("--out") + 1])
-            console.print(_line(folder, outcome), markup=False)
-            if outcome.code == INTERRUPTED:
-                return INTERRUPTED
-            if outcome.code != DONE:
-                failed.append(str(folder))
-            bar.move_to(number)
+    try:
+        with bar:
+            for number, (index, outcome) in enumerate(engine.run(train_apart, commands), start=1):
+                folder = Path(commands[index][commands[index].index("--out") + 1])
+                console.print(_line(folder, outcome), markup=False)
+                if outcome.code == INTERRUPTED:
+                    return INTERRUPTED
+                if outcome.code != DONE:
+                    failed[index] = folder.name
+                bar.move_to(number)
+    except OSError as error:
+        raise OSError(f"{error}; --resume goes on with the trainings") from error
     if failed:
-        raise OSError(f"{len(failed)} of {len(commands)} trainings failed; --resume tries again")
+        names = ", ".join(failed[index] for index in sorted(failed))
+        raise OSError(
+            f"{len(failed)} of {len(commands)} trainings failed ({names}); --resume tries again"
+        )
     folders = shlex.join(command[command.index("--out") + 1] for command in commands)
     plain_console().print(f"Compare: {this_command()} curves {folders}")
     return DONE
 
 
-def train_quietly(command: Sequence[str]) -> Outcome:
-    """Train in this process, without a bar, since several may share a terminal."""
-    heard = io.StringIO()
-    with redirect_stdout(io.StringIO()), redirect_stderr(heard):
-        try:
-            run, options = parse(command)
-            code = run(options)
-        except (ValueError, OSError) as error:
-            return Outcome(code=1, said=str(error))
-    return Outcome(code=code, said=next(reversed(heard.getvalue().strip().splitlines()), ""))
+def train_apart(command: Sequence[str]) -> Outcome:
+    """Train in a process of its own, which may be killed and takes no other training with it."""
+    with (
+        tempfile.TemporaryFile("w+") as heard,
+        running([*PYTHON, "-m", "swarm_mj", *command], output=heard) as process,
+    ):
+        code = process.wait()
+        heard.seek(0)
+        lines = heard.read().strip().splitlines()
+    if code < 0:
+        said = f"was ended by signal {-code}, perhaps for want of memory"
+    elif code not in OWN_ENDS:
+        said = f"ended with exit code {code}"
+    else:
+        said = lines[-1].removeprefix(f"{NAME}: error: ") if lines else ""
+    return Outcome(code=code, said=said)
 
 
 def _line(folder: Path, outcome: Outcome) -> str:

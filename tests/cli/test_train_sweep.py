@@ -1,9 +1,11 @@
 """`swarm-mj train --sweep`: what a file asks for, what is refused, and that its runs go on."""
 
+import sys
+
 import pytest
 
 from swarm_mj.cli import main
-from swarm_mj.cli.train_sweep import read_sweep, train_quietly
+from swarm_mj.cli.train_sweep import read_sweep, run_sweep, train_apart
 from swarm_mj.learning.run_folder import read_curve, read_run
 
 SWEEP = """
@@ -61,6 +63,7 @@ def test_flags_and_several_sizes_are_values_too(here):
     assert read_sweep(here / "b.toml") == {"training": ["--seed", "3"]}
 
 
+@pytest.mark.slow
 def test_runs_are_trained_and_go_on(sweep, capsys):
     (sweep / "sweep.toml").write_text(SWEEP.replace("[0.001, 0.01]", "[0.01]"))
     asked = ("--sweep", "sweep.toml", "--out", "runs")
@@ -122,6 +125,66 @@ def test_options_stand_in_the_file_or_on_the_command_line(sweep, capsys):
 
 
 def test_a_training_that_fails_elsewhere_says_why(here):
-    outcome = train_quietly(["train", "--robots", "5", "--init", "none", "--out", str(here / "x")])
-    assert outcome.code != 0
-    assert "there is no policy none" in outcome.said
+    outcome = train_apart(["train", "--robots", "5", "--init", "none", "--out", str(here / "x")])
+    assert outcome.code == 2
+    assert outcome.said.startswith("there is no policy none")
+
+
+DEADLY = """
+import os, signal
+class Logger:
+    def start(self, settings, folder):
+        if folder.name == "seed-1":
+            os.kill(os.getpid(), signal.SIGKILL)
+        if folder.name == "seed-2":
+            os._exit(9)
+    def log(self, row, decisions):
+        pass
+    def finish(self):
+        pass
+"""
+
+
+@pytest.mark.slow
+def test_a_training_that_is_killed_is_named_and_takes_no_other_with_it(sweep, capsys):
+    """One of three was, and the sweep ended with it, as did every attempt to go on."""
+    (sweep / "deadly.py").write_text(DEADLY)
+    text = SWEEP.partition("[sweep]")[0] + "logger = 'deadly:Logger'\n[sweep]\n"
+    (sweep / "sweep.toml").write_text(f"{text}seed = [1, 2, 3]\n")
+    for more in ((), ("--resume",)):
+        assert train("--sweep", "sweep.toml", "--out", "runs", "--jobs", 2, *more) == 1
+        said = capsys.readouterr().err
+        assert "seed-1: was ended by signal 9, perhaps for want of memory\n" in said
+        assert "seed-2: ended with exit code 9\n" in said
+        assert "seed-3: 64 decisions, age" in said
+        assert said.endswith("2 of 3 trainings failed (seed-1, seed-2); --resume tries again\n")
+
+
+def test_an_engine_that_breaks_down_tells_of_resume(sweep):
+    class Broken:
+        def run(self, work, pieces):  # noqa: ARG002
+            raise OSError("Ray gave up")
+            yield
+
+    with pytest.raises(OSError, match=r"^Ray gave up; --resume goes on with the trainings$"):
+        run_sweep(sweep / "sweep.toml", sweep / "runs", Broken(), is_resumed=False)
+
+
+def test_a_logger_is_loaded_before_trainings_so_that_it_travels_with_them(sweep, capsys):
+    """Ray's workers have the user's modules that are loaded here: they lacked the logger's."""
+    (sweep / "keeping_lines.py").write_text(DEADLY.replace("Logger", "Lines"))
+
+    class Ends:
+        def run(self, work, pieces):  # noqa: ARG002
+            assert "keeping_lines" in sys.modules
+            raise OSError("enough is seen")
+            yield
+
+    text = SWEEP.replace("[sweep]", "logger = 'keeping_lines:Lines'\n[sweep]")
+    (sweep / "sweep.toml").write_text(text)
+    with pytest.raises(OSError, match="enough is seen"):
+        run_sweep(sweep / "sweep.toml", sweep / "runs", Ends(), is_resumed=False)
+    (sweep / "sweep.toml").write_text(text.replace(":Lines", ":Line"))
+    assert train("--sweep", "sweep.toml", "--out", "runs") == 2
+    assert "keeping_lines.py has no Line; did you mean Lines?" in capsys.readouterr().err
+    assert not (sweep / "runs").exists()
