@@ -36,6 +36,12 @@ from swarm_mj.system.packages import need
 from swarm_mj.system.terminal import plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, owned
 
+LINE_EVERY_S = 30.0  # where no bar can be drawn, such as in the log of a cluster's job
+COMMIT_UNKNOWN = (
+    "The files name no commit: this swarm_mj was built from files without their git repository. "
+    "Install it from a clone."
+)
+
 
 @dataclass(frozen=True, kw_only=True)
 class StudyFlags(EngineOptions):
@@ -154,6 +160,9 @@ def run_study(options: StudyFlags, study: Study) -> int:
     chart = Output("--plot", options.plot, ".png|.svg|.pdf")
     if options.plot:
         need("matplotlib", "a chart")
+    if options.parquet:
+        for module in ("pandas", "pyarrow"):
+            need(module, "--parquet", "write --json, which has each mission's costs, too")
     # A study that is a file names more of them than the options.
     inputs = [*files_read(options), *files_read(study)]
     check_outputs(*outputs, chart, inputs=inputs, must_be_new=not options.force)
@@ -177,19 +186,14 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     costs = _begun(kept, header, is_resumed=options.resume) if kept else {}
     try:
         keep = partial(flying.append_progress, kept, header) if kept else None
-        with memory_errors(), _kept_if_flown(kept, costs):
-            flying.fly_study(study, costs, engine, keep, console)
+        with _kept_if_flown(kept, study, costs, console), memory_errors():
+            flying.fly_study(study, costs, engine, keep, console, line_every_s=LINE_EVERY_S)
     except (KeyboardInterrupt, MemoryError) as error:
-        if isinstance(error, MemoryError):
-            ending = "Out of memory"
-            code = FAILED
-        else:
-            ending = "Interrupted"
-            code = INTERRUPTED
+        is_memory = isinstance(error, MemoryError)
+        ending = "Out of memory" if is_memory else "Interrupted"
         hint = "the same command with --resume continues" if kept else "nothing was kept"
-        flown = flying.num_flown(study, costs)
-        console.print(f"{ending} after {flown} of {study.num_missions} missions; {hint}.")
-        return code
+        console.print(f"{ending} {_how_far(study, costs)}; {hint}.")
+        return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
         evaluated = study_results(study, costs, header)
         for path in options.files:
@@ -200,16 +204,36 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     print_results(results, is_wide=options.wide)
     if options.plot:
         _write_chart(options.plot, results)
+    if options.files and not header["commit"]:
+        console.print(COMMIT_UNKNOWN, soft_wrap=True)
     return DONE
 
 
+def _how_far(study: Study, costs: Mapping[int, BatchCosts]) -> str:
+    return f"after {flying.num_flown(study, costs)} of {study.num_missions} missions"
+
+
 @contextmanager
-def _kept_if_flown(kept: Path | None, costs: Mapping[int, BatchCosts]) -> Iterator[None]:
-    """Remove the progress file if an error leaves nothing in it; else `--force` would be needed."""
+def _kept_if_flown(
+    kept: Path | None, study: Study, costs: Mapping[int, BatchCosts], console: Console
+) -> Iterator[None]:
+    """Say after an error how to go on; remove the progress file if it has no missions.
+
+    Such a file would only make the corrected command ask for `--force`.
+    """
     try:
         yield
     except Exception as error:
-        if kept and not costs and not isinstance(error, MemoryError):
+        if not kept or isinstance(error, MemoryError):
+            raise
+        if costs:
+            console.print(
+                f"Failed {_how_far(study, costs)}; the same command with --resume continues. If "
+                "the study's own code must change first, start over with --force: missions of "
+                "changed code are not mixed with those flown.",
+                soft_wrap=True,
+            )
+        else:
             kept.unlink(missing_ok=True)
         raise
 

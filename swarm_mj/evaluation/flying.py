@@ -7,6 +7,7 @@ JSON gives floats back as they were, so a resumed evaluation ends in the same fi
 """
 
 import hashlib
+import math
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import closing
 from pathlib import Path
@@ -37,6 +38,8 @@ def fly_study(
     engine: Engine,
     keep: Callable[[int, BatchCosts], None] | None,
     console: Console,
+    *,
+    line_every_s: float = math.inf,
 ) -> None:
     """Fly the batches that `costs` lacks, while a bar shows how far it is.
 
@@ -46,6 +49,7 @@ def fly_study(
         engine: What flies the batches, here or on other machines.
         keep: Stores a batch's costs, by its index; None if they need not outlive the process.
         console: Where the bar is drawn.
+        line_every_s: How often, at most, a line says so where the console is no terminal [s].
 
     Raises:
         KeyboardInterrupt: Ctrl-C was pressed; `costs` has all batches that were flown.
@@ -56,7 +60,14 @@ def fly_study(
     # Batches come back in any order, each with its place in what the engine was given.
     flown = starts.run(fly_batch, [study.batches[index] for index in left])
     done = num_flown(study, costs)
-    bar = WorkBar("Flying", study.num_missions, "missions", completed=done, console=console)
+    bar = WorkBar(
+        "Flying",
+        study.num_missions,
+        "missions",
+        completed=done,
+        console=console,
+        line_every_s=line_every_s,
+    )
     with bar, closing(flown):
         for which, batch_costs in flown:
             index = left[which]

@@ -1,5 +1,6 @@
 """Text, tables and the bar of long work on a terminal, and the names of programs."""
 
+import math
 import os
 import shutil
 import sys
@@ -79,11 +80,21 @@ class WorkBar:
         *,
         completed: float | int = 0,
         console: Console | None = None,
+        line_every_s: float = math.inf,
     ) -> None:
-        """Prepare the bar, on standard error by default; without a unit, it shows no numbers."""
+        """Prepare the bar, on standard error by default; without a unit, it shows no numbers.
+
+        Where that is no terminal, a line tells the numbers, this often at most and only at an
+        advance.
+        """
         self.what = what
         self.text = ""
         console = console or Console(stderr=True, highlight=False)
+        self._console = console
+        self._unit = unit
+        self._line_every_s = math.inf if console.is_terminal else line_every_s
+        self._begun_s = 0.0
+        self._line_s = 0.0  # when the last line was printed, or else the work begun
         count = f"{{task.completed:.0f}}/{{task.total:.0f}} {unit}"
         self._bar = Progress(
             TextColumn("{task.fields[bar].shown_what}", markup=False),
@@ -101,6 +112,8 @@ class WorkBar:
         self._next_count_s = 0.0
 
     def __enter__(self) -> "WorkBar":
+        self._begun_s = time.monotonic()
+        self._line_s = self._begun_s
         self._bar.start()
         return self
 
@@ -115,6 +128,15 @@ class WorkBar:
         if now_s >= self._next_count_s:
             self._next_count_s = now_s + BETWEEN_COUNTS_S
             self._count()
+        if now_s >= self._line_s + self._line_every_s:
+            self._line_s = now_s
+            self._count()
+            self._print_line(now_s - self._begun_s)
+
+    def _print_line(self, elapsed_s: float) -> None:
+        [task] = self._bar.tasks
+        numbers = f"{task.completed:.0f} of {task.total:.0f} {self._unit}"
+        self._console.print(f"{self.what}: {numbers} after {elapsed_s:.0f} s", markup=False)
 
     def _count(self) -> None:
         self._bar.advance(self._id, self._done)

@@ -2,12 +2,13 @@
 
 import json
 import signal
+import sys
 
 import numpy as np
 import pytest
 from forks import files
 
-from swarm_mj.cli import parse
+from swarm_mj.cli import main, parse
 from swarm_mj.evaluation.results import COLUMNS, CONVERGENCE
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.mission import paper
@@ -236,3 +237,62 @@ def test_a_link_to_the_progress_file_is_no_output(refusal, tmp_path):
     (tmp_path / "l.csv").symlink_to(tmp_path / "p.json.progress")
     line = refusal("evaluate", *SMALL, "--json", "p.json", "--csv", "l.csv", "--force")
     assert "progress and --csv name the same file" in line
+
+
+FRAIL = """
+class Frail:
+    def __call__(self, buffers, states):
+        if buffers.position_m.shape[1] == 4:
+            raise RuntimeError("four is too many")
+        return 0.0 * states.velocity_mps
+"""
+BRIEF = ("--policy", "tdma", "--windows", "2", "--episodes", "2", "--range-ratio", "2")
+
+
+def test_a_part_that_fails_says_how_to_go_on_and_what_changed_code_needs(here, capsys):
+    (here / "frail.py").write_text(FRAIL)
+    command = ["evaluate", *BRIEF, "--robots", "3", "4", "--controller", "frail:Frail"]
+    command += ["--csv", "a.csv"]
+    assert main(command) == 2
+    hint, error = capsys.readouterr().err.splitlines()
+    assert hint.startswith("Failed after 2 of 4 missions; the same command with --resume continues")
+    assert "own code must change first, start over with --force" in hint
+    assert "four is too many" in error
+    assert main([*command, "--resume"]) == 2
+    assert "four is too many" in capsys.readouterr().err
+    (here / "frail.py").write_text(FRAIL.replace("== 4", "== 5"))
+    del sys.modules["frail"]
+    assert main([*command, "--resume"]) == 2
+    assert "is of another evaluation: its frail:Frail is" in capsys.readouterr().err
+    assert main([*command, "--force"]) == 0
+
+
+def test_a_failure_before_anything_was_flown_says_no_more_than_the_error(here, capsys):
+    (here / "frail_at_once.py").write_text(FRAIL)
+    command = ["evaluate", *BRIEF, "--robots", "4", "--controller", "frail_at_once:Frail"]
+    assert main([*command, "--csv", "a.csv"]) == 2
+    (error,) = capsys.readouterr().err.splitlines()
+    assert "four is too many" in error
+    assert files(here) == ["frail_at_once.py"]
+
+
+@pytest.mark.parametrize("module", ["pandas", "pyarrow"])
+def test_what_parquet_needs_is_asked_for_before_anything_is_flown(
+    here, monkeypatch, capsys, module
+):
+    """A small installation flew everything, and then could not write it."""
+    monkeypatch.setattr("swarm_mj.system.packages.is_installed", lambda name: name != module)
+    monkeypatch.setattr("swarm_mj.evaluation.flying.fly_study", None)
+    assert main(["evaluate", *BRIEF, "--robots", "3", "--parquet", "a.parquet"]) == 1
+    assert f"--parquet needs {module}, which is not installed; pip" in capsys.readouterr().err
+    assert files(here) == []
+
+
+def test_files_that_name_no_commit_are_said_to_once(here, monkeypatch, capsys):
+    monkeypatch.setattr("swarm_mj.evaluation.study.commit", lambda: None)
+    command = ["evaluate", *BRIEF, "--robots", "3"]
+    assert main(command) == 0
+    assert capsys.readouterr().err == ""
+    assert main([*command, "--csv", "a.csv", "--json", "a.json"]) == 0
+    assert capsys.readouterr().err.startswith("The files name no commit: this swarm_mj was built")
+    assert files(here) == ["a.csv", "a.json"]

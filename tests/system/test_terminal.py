@@ -89,6 +89,25 @@ def test_nothing_is_drawn_where_nobody_looks():
     assert file.getvalue() == ""
 
 
+def test_where_no_bar_is_drawn_a_line_now_and_then_says_how_far_it_is(monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: clock[0])
+    for is_terminal in (False, True):
+        file = io.StringIO()
+        console = Console(file=file, force_terminal=is_terminal, color_system=None)
+        clock[0] = 100.0
+        bar = WorkBar("Flying", 90, "missions", completed=10, console=console, line_every_s=30.0)
+        with bar:
+            for clock[0] in (110.0, 129.0, 131.0, 132.0, 160.0, 161.5):
+                bar.advance(10)
+        lines = [line for line in file.getvalue().splitlines() if line.startswith("Flying: ")]
+        expected = [
+            "Flying: 40 of 90 missions after 31 s",
+            "Flying: 70 of 90 missions after 62 s",
+        ]
+        assert lines == ([] if is_terminal else expected)
+
+
 def test_notebooks_which_claim_to_be_terminals_show_none(monkeypatch):
     monkeypatch.setenv("FORCE_COLOR", "1")  # as a notebook's server does
     assert terminal.quiet_console().is_terminal
