@@ -83,30 +83,44 @@ def packages() -> Iterator[Finding]:
     asked = [Requirement(text) for text in metadata.requires(PACKAGE) or ()]
     brought = [each for each in asked if each.marker is None or each.marker.evaluate({"extra": ""})]
     for each in brought:
-        found = _packages(each.name, [each], f"pip install '{each.name}{each.specifier}'")
+        found = _packages(each.name, [each])
         if found.state == "absent" and each.name in CORE:
             found = found._replace(state="broken", found=f"{found.found}; flying needs it")
         yield found
     for extra in metadata.metadata(PACKAGE).get_all("Provides-Extra") or ():
         added = [each for each in asked if each not in brought and each.name != PACKAGE]
         own = [each for each in added if each.marker and each.marker.evaluate({"extra": extra})]
-        yield _packages(f"extra {extra}", own, f"pip install '{PACKAGE}[{extra}]'")
+        yield _packages(f"extra {extra}", own)
 
 
-def _packages(name: str, asked: Sequence[Requirement], mend: str) -> Finding:
+def _packages(name: str, asked: Sequence[Requirement]) -> Finding:
+    """Find out whether packages are installed as asked; name those to install, and no others.
+
+    An extra of this package's own would bring all that the small core does without.
+    """
     problems = []
+    wanted = []
     found = "installed"
     for each in asked:
         try:
             found = metadata.version(each.name)
         except metadata.PackageNotFoundError:
             problems.append(f"{each.name} is not installed")
+            wanted.append(_as_installed(each))
         else:
             if not each.specifier.contains(found, prereleases=True):
                 problems.append(f"{each.name} {found} is not {each.specifier}")
+                wanted.append(_as_installed(each))
     if problems:
+        mend = f"pip install {' '.join(wanted)}"
         return Finding("packages", name, "absent", ", ".join(problems), mend)
     return Finding("packages", name, "ok", found if name == asked[0].name else "installed")
+
+
+def _as_installed(package: Requirement) -> str:
+    """Return a package as one types it after `pip install`."""
+    extras = f"[{','.join(sorted(package.extras))}]" if package.extras else ""
+    return f"'{package.name}{extras}{package.specifier}'"
 
 
 def tried() -> Iterator[Finding]:

@@ -60,6 +60,7 @@ ASKED = [
     *("numba>=0.68", "mujoco>=3.17,<4", "numpy>=2.2", "torch>=2.7", "av>=14"),
     'pettingzoo>=1.25; extra == "pettingzoo"',
     'ruff>=0.17; extra == "dev"',
+    'twine[keys]>=6; extra == "dev"',
     'swarm_mj[pettingzoo]; extra == "dev"',
 ]
 FOUND = {  # what is found of an installation that asks for much and has little
@@ -72,7 +73,10 @@ FOUND = {  # what is found of an installation that asks for much and has little
     "torch": ("ok", "2.7", ""),
     "av": ("absent", "av is not installed", "pip install 'av>=14'"),
     "extra pettingzoo": ("ok", "installed", ""),
-    "extra dev": ("absent", "ruff is not installed", "pip install 'swarm_mj[dev]'"),
+    "extra dev": (
+        *("absent", "ruff is not installed, twine is not installed"),
+        "pip install 'ruff>=0.17' 'twine[keys]>=6'",
+    ),
 }
 
 
