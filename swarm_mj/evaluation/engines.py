@@ -44,6 +44,7 @@ QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "
 GROUP = "processes that fly missions"  # the options' heading
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
+JOB_NAME = "swarm-mj"  # as `squeue` shows it
 
 
 @runtime_checkable
@@ -172,6 +173,8 @@ class Slurm:
         executor = submitit.AutoExecutor(folder, cluster=self.cluster)
         setup = [f"export {name}={value}" for name, value in SURROUNDINGS.items()]
         executor.update_parameters(
+            name=JOB_NAME,
+            slurm_wckey=JOB_NAME,  # the key by which a site may account for work
             slurm_array_parallelism=self.num_jobs,
             timeout_min=24 * 60,
             slurm_setup=setup,

@@ -247,6 +247,21 @@ if "submitit.core._submit" in " ".join(sys.orig_argv) and not os.path.exists("ki
     monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(folder), str(ROOT)]))
 
 
+def test_jobs_are_called_after_the_command(jobs, monkeypatch):
+    """As `squeue` shows them; they were called after the package that submits them."""
+    submitit = pytest.importorskip("submitit")
+    given = {}
+
+    def take(_executor, **parameters):
+        given.update(parameters)
+        raise KeyboardInterrupt
+
+    monkeypatch.setattr(submitit.AutoExecutor, "update_parameters", take)
+    with pytest.raises(KeyboardInterrupt):
+        list(jobs.run(square, [1]))
+    assert (given["name"], given["slurm_wckey"]) == ("swarm-mj", "swarm-mj")
+
+
 def test_pieces_that_always_fail_are_given_up(jobs, monkeypatch):
     monkeypatch.setattr(engines, "ATTEMPTS", 1)
     with pytest.raises(OSError, match=r"1 pieces failed 1 times; the logs are in .*slurm-") as told:
