@@ -1,7 +1,7 @@
 """Charts: one mission over time, policies below each other, and learning curves."""
 
 import textwrap
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -9,8 +9,9 @@ import matplotlib.pyplot as plt
 import numpy as np
 from jaxtyping import Float
 from matplotlib.axes import Axes
+from matplotlib.colors import to_hex
 from matplotlib.figure import Figure, SubFigure
-from matplotlib.ticker import LogLocator
+from matplotlib.ticker import LogLocator, MaxNLocator
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.figures import style
@@ -34,6 +35,8 @@ HEAD_IN = 1.1  # of title and axis
 LINE_IN = 0.16  # of a title
 CHARACTERS = 92  # of a line of a title
 FOOT_IN = 0.2
+LEGEND_CHARACTERS = 26  # of a line of a legend beside the axes
+LEGEND_ROW_IN = 0.2  # of such a line
 UNHEARD = "#eef0f4"  # behind the windows before everyone has heard of everyone
 MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 
@@ -130,12 +133,16 @@ def draw_learning(
     Returns:
         The figure: ages, on a logarithmic axis, over team decisions.
     """
+    labels = [textwrap.fill(style.escape_mathtext(label), LEGEND_CHARACTERS) for label in lines]
+    num_rows = len(levels) + sum(label.count("\n") + 1 for label in labels)
     with style.styled():
-        figure, (axes,) = style.panels("Learning curves", rows=1, height_in=HEAD_IN + PANEL_IN)
-        for label, curve in lines.items():
-            (line,) = axes.plot(curve.decisions, curve.age, label=style.escape_mathtext(label))
-            band = {"color": line.get_color(), "alpha": 0.2}
-            axes.fill_between(curve.decisions, curve.low, curve.high, **band)
+        height_in = max(HEAD_IN + PANEL_IN, HEAD_IN + LEGEND_ROW_IN * num_rows)
+        figure, (axes,) = style.panels("Learning curves", rows=1, height_in=height_in)
+        looks = _looks_beside([look_of(policy).colour for policy in levels])
+        for label, curve in zip(labels, lines.values(), strict=True):
+            colour, line_style = next(looks)
+            axes.plot(curve.decisions, curve.age, color=colour, linestyle=line_style, label=label)
+            axes.fill_between(curve.decisions, curve.low, curve.high, color=colour, alpha=0.2)
         for policy, age in levels.items():
             look = look_of(policy)
             axes.axhline(age, color=look.colour, linestyle=":", label=f"{look.label} {age:.1f}")
@@ -143,10 +150,26 @@ def draw_learning(
         axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         axes.yaxis.set_major_formatter("{x:g}")
         axes.yaxis.set_minor_formatter("")
+        axes.xaxis.set_major_locator(MaxNLocator(nbins=5))  # numbers of six digits are wide
         axes.xaxis.set_major_formatter("{x:,.0f}")
-        axes.legend(frameon=False)
+        # Beside the axes, where it covers no line.
+        axes.legend(frameon=False, loc="upper left", bbox_to_anchor=(1.0, 1.0))
         style.write_caption(figure, origin)
     return style.kept(figure)
+
+
+def _looks_beside(others: Sequence[str]) -> Iterator[tuple[str, str]]:
+    """Yield colours and styles of lines, three styles of each colour that is none of the others'.
+
+    More lines than that begin again.
+    """
+    cycle: list[str] = plt.rcParams["axes.prop_cycle"].by_key()["color"]
+    taken = {to_hex(colour) for colour in others}
+    free = [colour for colour in cycle if to_hex(colour) not in taken]
+    while True:
+        for line_style in ("-", "--", "-."):
+            for colour in free:
+                yield colour, line_style
 
 
 def _draw_policies(part: SubFigure, shown: Sequence[Result]) -> None:

@@ -2,13 +2,16 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import attrgetter
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from swarm_mj.cli.mission_options import mission_flags
+from swarm_mj.cli.options import flags_of
 from swarm_mj.cli.train_report import difference
+from swarm_mj.cli.train_settings import SPECS
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.learning.run_folder import (
     CURVE,
@@ -21,9 +24,9 @@ from swarm_mj.learning.run_folder import (
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
-from swarm_mj.system.fields import files_read, setting
+from swarm_mj.system.fields import as_typed, files_read, setting
 from swarm_mj.system.terminal import plain_console
-from swarm_mj.system.writing import Output, check_outputs
+from swarm_mj.system.writing import Output, check_outputs, write_csv
 
 if TYPE_CHECKING:  # matplotlib is slow to import
     from swarm_mj.api.charts import LearningCurve
@@ -54,13 +57,17 @@ class CurvesOptions:
         reads=_files_of_run,
     )
     plot: Path | None = setting(None, "draw the curves", metavar="FILE.png|.svg|.pdf")
-    force: bool = setting(False, "replace an existing figure")
+    csv: Path | None = setting(
+        None, "write a row for each run, with the options that differ", metavar="FILE.csv"
+    )
+    force: bool = setting(False, "replace existing files")
 
 
 def run(options: CurvesOptions) -> int:
     """Run the command; return its exit code."""
     check_outputs(
         Output("--plot", options.plot, ".png|.svg|.pdf"),
+        Output("--csv", options.csv, ".csv"),
         inputs=files_read(options),
         must_be_new=not options.force,
     )
@@ -79,8 +86,15 @@ def run(options: CurvesOptions) -> int:
         from swarm_mj.api.charts import draw_learning  # matplotlib is slow to import
         from swarm_mj.evaluation.figures.style import save
 
-        save(draw_learning(_lines(runs), levels, f"evaluated on {missions}"), options.plot)
+        lines = _lines(runs)
+        origin = f"evaluated on {missions}"
+        if len(lines) < len(runs):
+            origin += "; mean over seeds, and their range"
+        save(draw_learning(lines, levels, origin), options.plot)
         console.print(f"Wrote {options.plot}")
+    if options.csv:
+        _write_csv(options.csv, runs)
+        console.print(f"Wrote {options.csv}")
     return 0
 
 
@@ -125,21 +139,58 @@ def _comparisons(runs: Sequence[Learned]) -> Iterator[str]:
             yield f"{each.folder}: the last policy {'; '.join(said)}."
 
 
+def _options_that_differ(runs: Sequence[Learned]) -> dict[str, list[str]]:
+    """Return each run's values of the options that differ between runs, by the options' names."""
+    found: dict[str, list[str]] = {}
+    for place, spec in SPECS.items():
+        if not place.startswith("mission."):  # which are the same
+            name = flags_of(spec)[0].removeprefix("--")
+            found[name] = [as_typed(attrgetter(place)(each.asked.training)) for each in runs]
+    found["init"] = ["" if each.asked.init is None else str(each.asked.init) for each in runs]
+    return {name: values for name, values in found.items() if len(set(values)) > 1}
+
+
+def _write_csv(path: Path, runs: Sequence[Learned]) -> None:
+    """Write a row for each run: what is its own, its best and its last age, and the references'."""
+    differing = _options_that_differ(runs)
+    rows: list[dict[str, object]] = []
+    for number, each in enumerate(runs):
+        last = each.rows[-1]
+        row: dict[str, object] = {"run": str(each.folder), "seed": each.asked.training.seed}
+        for name, values in differing.items():
+            row[name] = values[number]
+        row["decisions"] = int(last.decisions)
+        row["aoi_best"] = min(point.aoi for point in each.rows)
+        row["aoi_last"] = last.aoi
+        row["aoi_last_sem"] = last.aoi_sem
+        for policy, age in last.references.items():
+            row[f"aoi_{policy.replace('-', '_')}"] = age  # as in curve.csv
+        rows.append(row)
+    names: dict[str, None] = {}  # in order; not all runs need have the same references
+    for row in rows:
+        names.update(dict.fromkeys(row))
+    write_csv(path, list(names), rows)
+
+
 def _lines(runs: Sequence[Learned]) -> "dict[str, LearningCurve]":
     """Return a line, by its label, for the runs that differ only in their seed."""
     groups: dict[tuple[Training, Path | None], list[Learned]] = {}
     for each in runs:
         alike = replace(each.asked.training, seed=0), each.asked.init
         groups.setdefault(alike, []).append(each)
-    return {_label(group): _line(group) for group in groups.values()}
-
-
-def _label(group: Sequence[Learned]) -> str:
-    first = group[0].folder
-    if len(group) == 1:
-        return str(first)
-    num_seeds = len({each.asked.training.seed for each in group})
-    return f"{first} to {group[-1].folder.name}: mean and range of {num_seeds} seeds"
+    differing = _options_that_differ([group[0] for group in groups.values()])
+    differing.pop("seed", None)  # over which a line is the mean
+    lines: dict[str, LearningCurve] = {}
+    for number, group in enumerate(groups.values()):
+        own = [f"{name.replace('-', ' ')} {values[number]}" for name, values in differing.items()]
+        num_seeds = len({each.asked.training.seed for each in group})
+        if num_seeds > 1:
+            own.append(f"{num_seeds} seeds")
+        label = ", ".join(own)
+        if not own or label in lines:  # what differs is no option, such as a setting of 1.0.0
+            label = f"{group[0].folder}: {label}" if own else str(group[0].folder)
+        lines[label] = _line(group)
+    return lines
 
 
 def _line(group: Sequence[Learned]) -> "LearningCurve":

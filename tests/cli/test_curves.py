@@ -7,6 +7,7 @@ from pathlib import Path
 import matplotlib.pyplot as plt
 import numpy as np
 import pytest
+from matplotlib.colors import to_hex
 
 from swarm_mj.api.charts import LearningCurve, draw_learning
 from swarm_mj.cli import main
@@ -30,6 +31,14 @@ def put_run(folder, curve, seed=1, mission=MISSION, robots=(5,)):
     write_run(folder, TrainingRun(training=training, limits=Limits(decisions=100)))
     if curve is not None:
         (folder / "curve.csv").write_text(curve)
+
+
+def change(folder, before, after):
+    """Changes a run's settings as they are stored."""
+    settings = folder / "settings.json"
+    text = settings.read_text()
+    assert before in text
+    settings.write_text(text.replace(before, after))
 
 
 @pytest.fixture
@@ -74,18 +83,59 @@ def test_a_run_that_began_with_a_stored_policy_is_a_line_of_its_own(runs):
 
 def test_seeds_are_one_line_in_the_band_of_their_range_and_other_settings_another(runs):
     put_run(runs / "b", FIRST, mission=MISSION, seed=7)
-    settings = (runs / "b" / "settings.json").read_text()
-    (runs / "b" / "settings.json").write_text(settings.replace('"latent": 32', '"latent": 16'))
+    change(runs / "b", '"latent": 32', '"latent": 16')
     lines = _lines([_read(runs / name) for name in (*CURVES, "b")])
     seeds, alone = lines.items()
-    assert seeds[0] == f"{runs}/runs/a-1 to a-2: mean and range of 2 seeds"
+    assert seeds[0] == "latent 32, 2 seeds"
     np.testing.assert_array_equal(seeds[1].decisions, [0, 100, 200])
     np.testing.assert_array_equal(seeds[1].age, [60, 25, 29])
     np.testing.assert_array_equal(seeds[1].low, [60, 20, 24])
     np.testing.assert_array_equal(seeds[1].high, [60, 30, 34])
-    assert alone[0] == str(runs / "b")
+    assert alone[0] == "latent 16"
     assert alone[1].decisions.tolist() == [0]
     assert alone[1].low.tolist() == alone[1].age.tolist() == alone[1].high.tolist() == [60]
+
+
+def test_a_line_is_called_by_what_tells_it_apart_or_else_by_its_folder(runs):
+    whole = [_read(runs / name) for name in CURVES]
+    assert list(_lines(whole)) == ["2 seeds"]
+    assert list(_lines(whole[:1])) == [f"{runs}/runs/a-1"]
+    change(runs / "runs/a-2", '"silent_share": 0.1', '"silent_share": 0.2')  # is no option
+    lines = list(_lines([_read(runs / name) for name in CURVES]))
+    assert lines == [f"{runs}/runs/a-1", f"{runs}/runs/a-2"]
+    change(runs / "runs/a-2", '"num_epochs": 2', '"num_epochs": 3')
+    assert list(_lines([_read(runs / name) for name in CURVES])) == ["epochs 2", "epochs 3"]
+
+
+def test_a_table_has_a_row_a_run_and_the_options_that_differ(runs, capsys):
+    change(runs / "runs/a-2", '"num_epochs": 2', '"num_epochs": 3')
+    assert main(["curves", *CURVES, "--csv", "a.csv"]) == 0
+    assert "Wrote a.csv" in capsys.readouterr().out
+    assert (runs / "a.csv").read_text().splitlines() == [
+        "run,seed,epochs,decisions,aoi_best,aoi_last,aoi_last_sem,aoi_tdma",
+        "runs/a-1,1,2,200,30.0,34.0,1.0,26.25",
+        "runs/a-2,2,3,250,20.0,23.0,1.0,26.25",
+    ]
+    assert main(["curves", *CURVES, "--csv", "a.csv"]) == 2
+    assert "a.csv exists" in capsys.readouterr().err
+
+
+def test_no_two_lines_look_alike_and_the_legend_covers_none():
+    course = np.array([60.0, 25.0])
+    curve = LearningCurve(decisions=np.array([0.0, 1.0]), age=course, low=course, high=course)
+    labels = [f"learning rate 0.000{n}, silence logit 5.5, 2 seeds" for n in range(9)]
+    figure = draw_learning(dict.fromkeys(labels, curve), {"tdma": 26.25, "spatial-tdma": 20}, "x")
+    (axes,) = figure.axes
+    looks = {(to_hex(line.get_color()), line.get_linestyle()) for line in axes.lines}
+    assert len(looks) == 11
+    tdma = axes.lines[-2].get_color()
+    assert all(to_hex(line.get_color()) != to_hex(tdma) for line in axes.lines[:9])
+    figure.draw_without_rendering()
+    legend = axes.get_legend().get_window_extent()
+    assert legend.x0 >= axes.get_window_extent().x1
+    assert legend.y0 >= 0.0
+    assert legend.x1 <= figure.bbox.x1
+    plt.close(figure)
 
 
 def test_lines_bands_and_levels_stand_where_they_should():

@@ -47,7 +47,7 @@ def test_the_curve_is_drawn_with_the_levels_and_a_caption(results, tmp_path, mon
     (band,) = axes.collections
     low = rows[0].aoi - rows[0].aoi_sem
     assert band.get_paths()[0].vertices[:, 1].tolist().count(pytest.approx(low)) > 0
-    labels = [text.get_text() for text in axes.get_legend().get_texts()]
+    labels = [" ".join(text.get_text().split()) for text in axes.get_legend().get_texts()]
     assert labels == [program.LABEL, "tdma 33.0", "spatial-tdma 26.0"]
 
 
