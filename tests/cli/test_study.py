@@ -1,6 +1,7 @@
 """`swarm-mj study`: files that are studies, and results that are compared."""
 
 import json
+from pathlib import Path
 
 import pandas as pd
 import pytest
@@ -11,6 +12,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.registry import POLICIES
 from swarm_mj.system.packages import asset
 
+ROOT = Path(__file__).parents[2]
 SMALL = "[study]\npolicies = ['mst', 'round-robin']\nepisodes = 2\n"
 MISSION = "[mission]\nnum_robots = 5\nnum_windows = 12\nrange_ratio = 1\n"
 OPTIONS = "--policy mst round-robin --episodes 2 --robots 5 --windows 12 --range-ratio 1"
@@ -253,3 +255,25 @@ def test_tasks_without_a_cost_are_compared_by_their_age_only(succeed, tmp_path):
     said = succeed("study", "compare", "a.parquet", "a.parquet").stdout
     firsts = [line.split()[0] for line in said.strip().splitlines()]
     assert firsts == ["aoi,", "policy", "mst", "round-robin"]
+
+
+def test_results_of_two_machines_are_put_together_as_the_guide_says(
+    succeed, refusal, tmp_path, monkeypatch
+):
+    for name, seed in (("first", 1000), ("second", 1002)):
+        text = SMALL.replace("episodes = 2", f"episodes = 2\nseed = {seed}")
+        (tmp_path / "s.toml").write_text(text + MISSION)
+        succeed("study", "run", "s.toml", "--parquet", f"{name}.parquet")
+    (tmp_path / "s.toml").write_text(SMALL.replace("episodes = 2", "episodes = 4") + MISSION)
+    succeed("study", "run", "s.toml", "--parquet", "whole.parquet")
+    guide = (ROOT / "docs" / "studies.md").read_text()
+    code = guide.partition("## Results of two machines")[2].split("```")[1].removeprefix("text\n")
+    monkeypatch.chdir(tmp_path)
+    exec(code, {})
+    order = ["policy", "seed"]
+    both = pd.read_parquet("both.parquet").sort_values(order, ignore_index=True)
+    whole = pd.read_parquet("whole.parquet").sort_values(order, ignore_index=True)
+    pd.testing.assert_frame_equal(both, whole)
+    succeed("study", "compare", "both.parquet", "whole.parquet")
+    exec(code.replace("second", "first"), {})
+    assert "is there more than once" in refusal("study", "compare", "both.parquet", "both.parquet")
