@@ -120,28 +120,39 @@ def run_sweep(path: Path, out: Path, engine: Engine, *, is_resumed: bool) -> int
         asked_run(asked)  # whatever is wrong is said before anything is trained
         commands.append(command)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
-    failed: dict[int, str] = {}  # the names of runs, by their places in the sweep
-    bar = WorkBar("Training", len(commands), "trainings", console=console)
     try:
-        with bar:
-            for number, (index, outcome) in enumerate(engine.run(train_apart, commands), start=1):
-                folder = Path(commands[index][commands[index].index("--out") + 1])
-                console.print(_line(folder, outcome), markup=False)
-                if outcome.code == INTERRUPTED:
-                    return INTERRUPTED
-                if outcome.code != DONE:
-                    failed[index] = folder.name
-                bar.move_to(number)
+        failed = _train_all(commands, engine, console)
+    except KeyboardInterrupt:
+        console.print("Interrupted; --resume goes on from each training's last checkpoint.")
+        return INTERRUPTED
     except OSError as error:
         raise OSError(f"{error}; --resume goes on with the trainings") from error
     if failed:
-        names = ", ".join(failed[index] for index in sorted(failed))
         raise OSError(
-            f"{len(failed)} of {len(commands)} trainings failed ({names}); --resume tries again"
+            f"{len(failed)} of {len(commands)} trainings failed ({', '.join(failed)}); --resume "
+            "tries again"
         )
-    folders = shlex.join(command[command.index("--out") + 1] for command in commands)
+    folders = shlex.join(map(str, map(_folder_of, commands)))
     plain_console().print(f"Compare: {this_command()} curves {folders}")
     return DONE
+
+
+def _train_all(commands: Sequence[list[str]], engine: Engine, console: Console) -> list[str]:
+    """Train by all commands, with a line for each; return the names of the runs that failed."""
+    codes: dict[int, int] = {}  # exit codes by the commands' places
+    bar = WorkBar("Training", len(commands), "trainings", console=console)
+    with bar:
+        for index, outcome in engine.run(train_apart, commands):
+            console.print(_line(_folder_of(commands[index]), outcome), markup=False)
+            if outcome.code == INTERRUPTED:
+                raise KeyboardInterrupt
+            codes[index] = outcome.code
+            bar.move_to(len(codes))
+    return [_folder_of(commands[index]).name for index in sorted(codes) if codes[index] != DONE]
+
+
+def _folder_of(command: Sequence[str]) -> Path:
+    return Path(command[command.index("--out") + 1])
 
 
 def train_apart(command: Sequence[str]) -> Outcome:

@@ -170,6 +170,17 @@ def test_an_engine_that_breaks_down_tells_of_resume(sweep):
         run_sweep(sweep / "sweep.toml", sweep / "runs", Broken(), is_resumed=False)
 
 
+def test_ctrl_c_tells_of_resume(sweep, capsys):
+    class Interrupted:
+        def run(self, work, pieces):  # noqa: ARG002
+            raise KeyboardInterrupt
+            yield
+
+    path = sweep / "sweep.toml"
+    assert run_sweep(path, sweep / "runs", Interrupted(), is_resumed=False) == 130
+    assert capsys.readouterr().err.startswith("Interrupted; --resume goes on from each training's")
+
+
 def test_a_logger_is_loaded_before_trainings_so_that_it_travels_with_them(sweep, capsys):
     """Ray's workers have the user's modules that are loaded here: they lacked the logger's."""
     (sweep / "keeping_lines.py").write_text(DEADLY.replace("Logger", "Lines"))
