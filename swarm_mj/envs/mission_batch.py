@@ -31,6 +31,7 @@ REWARDS = (*BY_REWARD, "credit")
 # Training and environments draw seeds from here on, so small ones are left for evaluations.
 FIRST_TRAINING_SEED = 2**40
 LAST_TRAINING_SEED = 2**62
+NOT_BEGUN = "no mission has begun; call reset() first"
 
 
 class MissionBatch:
@@ -68,7 +69,8 @@ class MissionBatch:
         self.reward = reward
         self.with_parents = with_parents
         self.swarm: Swarm | None = None  # made when it begins
-        self._components = components
+        self._graphs: Graphs | None = None  # likewise
+        self.components = components
         self._keeps_recipients = keeps_recipients
         self._unknown_age = unknown_age
         self._extractor = make_extractor(features, mission)
@@ -77,7 +79,7 @@ class MissionBatch:
     def restart(self, seeds: Sequence[int], last_window: int | None = None) -> None:
         """Begin the missions of B seeds, to be cut off after `last_window` if that is given."""
         if self.swarm is None:
-            self.swarm = Swarm(self.mission, seeds, **self._components.given)
+            self.swarm = Swarm(self.mission, seeds, **self.components.given)
         else:
             self.swarm.restart(seeds)
         self.seeds = list(seeds)
@@ -156,18 +158,26 @@ class MissionBatch:
 
     def _see(self) -> None:
         """Keep the robots' present graphs; a robot that has failed may only be silent."""
-        self.graphs: Graphs = self._extractor.graphs(self.flown.views)
+        graphs = self._extractor.graphs(self.flown.views)
         if self.flown.states.is_active is not None:
             own = np.tile(np.eye(self.mission.num_robots, dtype=np.bool_), (self.num_missions, 1))
-            may_address = self.graphs.may_address & (self.is_active.reshape(-1, 1) | own)
-            self.graphs = replace(self.graphs, may_address=may_address)
+            may_address = graphs.may_address & (self.is_active.reshape(-1, 1) | own)
+            graphs = replace(graphs, may_address=may_address)
+        self._graphs = graphs
 
     @property
     def flown(self) -> Swarm:
         """The swarm that flies the missions; raises ValueError before they have begun."""
         if self.swarm is None:
-            raise ValueError("no mission has begun; call reset() first")
+            raise ValueError(NOT_BEGUN)
         return self.swarm
+
+    @property
+    def graphs(self) -> Graphs:
+        """The graphs that robots now see; raises ValueError before the missions have begun."""
+        if self._graphs is None:
+            raise ValueError(NOT_BEGUN)
+        return self._graphs
 
     @property
     def is_over(self) -> bool:

@@ -2,7 +2,7 @@
 
 import copy
 from numbers import Integral
-from typing import Any, NamedTuple, Unpack
+from typing import Any, NamedTuple, Unpack, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -10,8 +10,9 @@ from gymnasium.vector.utils import batch_space
 from jaxtyping import Float, Float32
 
 from swarm_mj.control.motion import Controller, Costed, controller_of
+from swarm_mj.envs import environment_id
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
-from swarm_mj.mission import MISSION_DISTANCE_M, Mission, TaskAndFields, make_mission
+from swarm_mj.mission import MISSION_DISTANCE_M, Mission, Task, TaskAndFields, make_mission
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
@@ -91,6 +92,11 @@ def make_batch(
     """
     if not isinstance(num_missions, Integral) or num_missions < 1:
         raise ValueError(f"the number of missions must be 1 or more, not {num_missions!r}")
+    for task in get_args(Task):
+        if mission == environment_id(task):
+            raise ValueError(
+                f"{mission!r} is a name of gymnasium.make; did you mean {task!r}, the mission's task?"
+            )
     if "seed" in fields:
         raise TypeError("seed is no option of an environment; give it to reset(seed=...)")
     mission = make_mission(mission, preset=preset, **fields)

@@ -9,11 +9,14 @@ from typing import Any, Unpack
 
 import numpy as np
 import stable_baselines3
+from gymnasium import spaces
 from stable_baselines3.common.base_class import BaseAlgorithm
 from stable_baselines3.common.torch_layers import CombinedExtractor
 from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
 from torch import nn
 
+from swarm_mj.envs.flown_model import OF_OTHERS, Flown, is_masked, missions_of
+from swarm_mj.envs.held_out_callback import HeldOutCallback
 from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.options import (
     BatchOptions,
@@ -29,8 +32,12 @@ from swarm_mj.policies.stored import save_weights
 from swarm_mj.system.arguments import check_choice
 from swarm_mj.system.packages import commit, version
 
+__all__ = ["Flown", "HeldOutCallback", "make_vec_env", "save_policy"]
+
 # Of networks that can be stored as policies.
 ACTIVATIONS: dict[Activation, type[nn.Module]] = {"tanh": nn.Tanh, "relu": nn.ReLU}
+# The way out for models that cannot be stored.
+INSTEAD = "fly the model itself: swarm_mj.envs.sb3.Flown(model)"
 
 
 def make_vec_env(
@@ -50,7 +57,9 @@ def make_vec_env(
             sees what one robot knows; or a "team", which decides for all at once.
         seed: Of the first mission; the others count on from it. Later missions are drawn from
             these; None draws the first ones, too. A model with a `seed` of its own begins with
-            that mission instead: stable-baselines3 seeds its environment with it.
+            that mission instead: stable-baselines3 seeds its environment with it, also in
+            `load(path, env=env)`. So load a model without `env` to evaluate it, or call
+            `env.seed(3000)` afterwards.
         **options: As of `make_batch`: the reward, the features, and any field of `Mission`.
 
     Returns:
@@ -68,6 +77,12 @@ def make_vec_env(
     check_choice("agent", agent, AGENTS)
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
+    if "render_mode" in options:
+        raise TypeError(
+            "make_vec_env has no 'render_mode', as it draws nothing; see a model by "
+            "swarm_mj.fly(..., policy=swarm_mj.envs.sb3.Flown(model)), or draw the environment "
+            'gymnasium.make(..., render_mode="rgb_array")'
+        )
     if agent == "robot":
         batch = make_batch(mission, num_missions, **options)
         observation_space, action_space = robot_spaces(batch)
@@ -87,7 +102,8 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
     Args:
         model: PPO, A2C or MaskablePPO with its own "MultiInputPolicy", trained on an environment
             of `make_vec_env` whose agents are robots; `VecNormalize` may have normalised its
-            rewards. A model that was loaded needs it again: `PPO.load(path, env=env)`.
+            rewards. A model that was loaded needs that environment again, `PPO.load(path,
+            env=env)`, which then flies the missions of the model's seed: evaluate on another one.
         path: The file, which is replaced if it exists; `.safetensors` is appended unless it ends
             so.
 
@@ -95,7 +111,8 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
         The path of the file, with its ending.
 
     Raises:
-        ValueError: If the model is another, or too large for a policy's file.
+        ValueError: If the model is another, or too large for a policy's file. `Flown` flies models
+            with a features extractor of your own, DQN, and those of `VecNormalize`.
         OSError: If the file cannot be written.
 
     Example:
@@ -114,7 +131,7 @@ def save_policy(model: BaseAlgorithm, path: Path | str) -> Path:
         num_features=batch.num_features,
         hidden=tuple(layer.out_features for layer in linear[:-1]),
         activation=_activation_of(layers),
-        obeys_mask=hasattr(model.policy.action_dist, "apply_masking"),
+        obeys_mask=is_masked(model),
     )
     training = {
         "algorithm": f"{type(model).__name__} of stable-baselines3 {stable_baselines3.__version__}",
@@ -135,27 +152,25 @@ def _trained_on(model: BaseAlgorithm) -> MissionBatch:
     if not hasattr(model.policy, "action_dist"):
         raise ValueError(
             f"a policy is made of an actor that draws recipients, and {kind} has none; train PPO, "
-            "A2C or MaskablePPO"
+            f"A2C or MaskablePPO, or {INSTEAD}"
         )
     if env is None:
         raise ValueError(
             f"the model has no environment; load the model with it: {kind}.load(path, env=env)"
         )
-    missions = env.unwrapped
-    if not isinstance(missions, SwarmVecEnv) or missions.agent != "robot":
-        raise ValueError(
-            "a policy is made of a model that decides for one robot, and this one was trained on "
-            'another environment; train on swarm_mj.envs.sb3.make_vec_env(..., agent="robot")'
-        )
-    batch = missions.batches[0]
+    batch = missions_of(model)
+    if batch is None or not isinstance(model.action_space, spaces.Discrete):
+        raise ValueError(OF_OTHERS)
     if batch.with_parents:
-        raise ValueError("a policy of this kind sees no parents; train without with_parents=True")
+        raise ValueError(
+            "a policy of this kind sees no parents; train without with_parents=True, or " + INSTEAD
+        )
     normalised = unwrap_vec_wrapper(env, VecNormalize)
     if normalised is not None and normalised.norm_obs:
         raise ValueError(
             "a policy cannot be made of a model whose observations VecNormalize normalises, as it "
             "would need their averages; they are normalised already, so train with "
-            "VecNormalize(env, norm_obs=False)"
+            f"VecNormalize(env, norm_obs=False), or {INSTEAD}"
         )
     return batch
 
@@ -169,7 +184,8 @@ def _actor(model: BaseAlgorithm) -> list[nn.Module]:
     if not is_plain or others:
         raise ValueError(
             f'a policy is made of the actor of "MultiInputPolicy" alone, not of '
-            f"{type(policy).__name__}'s {others[0] if others else 'own features extractor'}"
+            f"{type(policy).__name__}'s {others[0] if others else 'own features extractor'}; "
+            f"train without it, or {INSTEAD}"
         )
     return [*policy.mlp_extractor.policy_net, policy.action_net]
 

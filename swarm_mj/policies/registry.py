@@ -166,6 +166,11 @@ def make_policy_with(arguments: PolicyArguments, name: str, mission: Mission) ->
     check_kind("policy", name, str, '"planner"')
     check_kind("mission", mission, Mission, 'paper("flocking")')
     name = flown_name(name, mission)
+    if name.endswith(".zip") and not os.path.isdir(name):
+        raise ValueError(
+            f"policy {name} seems to be a model of stable-baselines3: store it with "
+            "swarm_mj.envs.sb3.save_policy, or fly it with swarm_mj.envs.sb3.Flown"
+        )
     if not (name in POLICIES or is_stored(name) or is_own_policy(name)):
         raise ValueError(
             f"policy must be one of {', '.join(POLICIES)}, a run's folder or a {SUFFIX} file with "

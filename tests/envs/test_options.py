@@ -22,8 +22,8 @@ SMALL = {"num_robots": 3, "num_windows": 5}
 
 RESET = {"options": {"mask": 1}}
 REFUSED = {
-    "one of .*, random-walk, .*'swarm_mj/RandomWalk-v0'": lambda: make_batch(
-        "swarm_mj/RandomWalk-v0"
+    "'swarm_mj/RandomWalk-v0' is a name of gymnasium.*; did you mean 'random-walk'": lambda: (
+        make_batch("swarm_mj/RandomWalk-v0")
     ),
     "one of .*; did you mean random-walk": lambda: make_batch("random_walk"),
     "multiple values for keyword argument 'task'": lambda: gymnasium.make(

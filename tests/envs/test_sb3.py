@@ -57,6 +57,7 @@ def test_maskable_ppo_learns():
         ({"agent": "team", "reward": "credit"}, "choose reward aoi"),
         ({"num_envs": 3}, "has no 'num_envs'; did you mean num_missions"),
         ({"n_envs": 3}, "has no 'n_envs'; did you mean num_missions"),
+        ({"render_mode": "rgb_array"}, r"has no 'render_mode', .* Flown\(model\)"),
     ],
 )
 def test_refusals(options, message):
@@ -143,14 +144,23 @@ class Halved(CombinedExtractor):
 @pytest.mark.parametrize(
     ("model", "message"),
     [
-        (lambda: DQN("MultiInputPolicy", make_vec_env(**SMALL), buffer_size=9), "DQN has none"),
+        (
+            lambda: DQN("MultiInputPolicy", make_vec_env(**SMALL), buffer_size=9),
+            r"DQN has none; .*Flown\(model\)",
+        ),
         (lambda: PPO("MultiInputPolicy", SwarmEnv(**SMALL)), "trained on another environment"),
         (lambda: trained(PPO, make_vec_env(agent="team", **SMALL)), "decides for one robot"),
-        (lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)), "sees no parents"),
-        (lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))), "norm_obs=False"),
+        (
+            lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)),
+            r"sees no parents; .*Flown\(model\)",
+        ),
+        (
+            lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))),
+            r"norm_obs=False\), or .*Flown\(model\)",
+        ),
         (
             lambda: trained(PPO, policy_kwargs={"features_extractor_class": Halved}),
-            "own features extractor",
+            r"own features extractor; .*Flown\(model\)",
         ),
         (lambda: trained(PPO, policy_kwargs={"activation_fn": nn.ELU}), "tanh, relu, not ELU"),
         (

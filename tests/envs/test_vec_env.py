@@ -122,3 +122,9 @@ def test_what_environments_do_not_have():
         env.set_attr("wind", 3)
     assert not any(env.env_is_wrapped(VecMonitor))
     assert env.get_attr("render_mode") == [None] * 4
+
+
+def test_masks_before_the_first_reset_are_refused():
+    env = make_vec_env(**SMALL)
+    with pytest.raises(ValueError, match=r"no mission has begun; call reset\(\) first"):
+        env.env_method("action_masks")

@@ -8,10 +8,11 @@ import linecache, traceback
 from pathlib import Path
 import numpy as np
 import swarm_mj
+from stable_baselines3 import PPO
 from swarm_mj.envs.gymnasium import SwarmEnv
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.envs.pettingzoo import parallel_env
-from swarm_mj.envs.sb3 import make_vec_env
+from swarm_mj.envs.sb3 import Flown, make_vec_env
 
 WRONG = ["x", b"x", None, 5, 1.5, True, [], ["x"], [None], {}, {"x": 1}, object(), int, np.zeros(3)]
 WRONG += [np.zeros(3, complex), float("nan"), 10**400, [[1], [2, 3]], lambda: 1]
@@ -56,6 +57,8 @@ CALLS = {
     "evaluate, policies": lambda wrong: swarm_mj.evaluate(wrong, MISSION, num_missions=1),
     "evaluate, missions": lambda wrong: swarm_mj.evaluate("tdma", MISSION, num_missions=wrong),
     "evaluate, seed": lambda wrong: swarm_mj.evaluate("tdma", MISSION, num_missions=1, seed=wrong),
+    "Flown, model": lambda wrong: Flown(wrong, MISSION),
+    "Flown, mission": lambda wrong: Flown(PPO("MultiInputPolicy", begun(make_vec_env)), wrong),
     "SwarmEnv.step": begun(SwarmEnv).step,
     "SwarmVectorEnv.step": begun(SwarmVectorEnv, 2, "stationary").step,
     "parallel_env.step": begun(parallel_env).step,
@@ -68,7 +71,7 @@ FINE = {
     ("Swarm, channel", "None"), ("Swarm, controller", "None"), ("Swarm, scene", "None"),
     ("Swarm, threads", "5"), ("Swarm, threads", "True"), ("fly, task", "None"), ("fly, seed", "5"),
     ("evaluate, missions", "5"), ("evaluate, seed", "5"),
-    ("parallel_env.step", "{}"),
+    ("Flown, mission", "None"), ("parallel_env.step", "{}"),
     ("an agent's action", "True"),
 }
 
@@ -104,4 +107,4 @@ def test_what_is_of_a_wrong_kind_is_refused_by_a_sentence_of_ours(forks, tmp_pat
     done = forks.run(tmp_path, script)
     assert done.returncode == 0, done.stderr
     assert done.stdout == ""
-    record_property("tries", 29 * 19)
+    record_property("tries", 31 * 19)

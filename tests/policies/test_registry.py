@@ -62,6 +62,8 @@ def test_a_name_is_a_name_whatever_lies_about():
     [
         ("rumour", "or module:Name of your own, not 'rumour'"),
         ("", "or module:Name of your own, not ''"),
+        ("mine.zip", r"store it with swarm_mj\.envs\.sb3\.save_policy"),
+        ("./mine.zip", r"store it with swarm_mj\.envs\.sb3\.save_policy"),
         ("runs/y", r"there is no policy runs/y; name a \.safetensors file"),
     ],
 )

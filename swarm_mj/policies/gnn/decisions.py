@@ -1,6 +1,8 @@
 """From the network's numbers to logits over recipients (III-C)."""
 
 import math
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 import numpy as np
 import torch
@@ -31,24 +33,30 @@ def network_logits(
     may_address = torch.from_numpy(graphs.may_address)
     owner = torch.arange(num_rows) % num_robots
     device = next(network.parameters()).device
+    with single_thread(), torch.inference_mode():
+        remembered = None if memory is None else torch.from_numpy(memory).to(device)
+        seen = (node.to(device), parent.to(device))
+        output, remembered = evaluated(
+            network, *seen, may_address.to(device), owner.to(device), remembered
+        )
+        logits = recipient_logits(
+            output.cpu(),
+            owner=owner,
+            may_address=may_address,
+            silence_logit=silence_logit,
+            most_speech=most_speech,
+            has_turn=torch.from_numpy(graphs.has_turn),
+        ).numpy()
+        return logits, None if remembered is None else remembered.cpu().numpy()
+
+
+@contextmanager
+def single_thread() -> Iterator[None]:
+    """Let torch compute on one thread within it: small batches are slower on several."""
     num_threads = torch.get_num_threads()
-    torch.set_num_threads(1)  # small batches are slower on several
+    torch.set_num_threads(1)
     try:
-        with torch.inference_mode():
-            remembered = None if memory is None else torch.from_numpy(memory).to(device)
-            seen = (node.to(device), parent.to(device))
-            output, remembered = evaluated(
-                network, *seen, may_address.to(device), owner.to(device), remembered
-            )
-            logits = recipient_logits(
-                output.cpu(),
-                owner=owner,
-                may_address=may_address,
-                silence_logit=silence_logit,
-                most_speech=most_speech,
-                has_turn=torch.from_numpy(graphs.has_turn),
-            ).numpy()
-            return logits, None if remembered is None else remembered.cpu().numpy()
+        yield
     finally:
         torch.set_num_threads(num_threads)  # the setting is the process's
 
