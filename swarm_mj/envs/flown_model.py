@@ -80,14 +80,17 @@ class Flown(LearnedPolicy):
         self._num_robots, self._num_features = _num_robots_and_features(model)
         _check_decides(model)
         batch = missions_of(model)
-        if mission is None and batch is None:
-            raise ValueError(
-                "the model has no environment that says what it flies; give the mission: "
-                "Flown(model, mission)"
-            )
-        self.mission = mission or cast("MissionBatch", batch).mission
-        self._check_size(self.mission.num_robots)
-        features = features or (batch.features if batch else USUAL_FEATURES)
+        if mission is None:
+            if batch is None:
+                raise ValueError(
+                    "the model has no environment that says what it flies; give the mission: "
+                    "Flown(model, mission)"
+                )
+            mission = batch.mission
+        self.mission = mission
+        self._check_size(mission.num_robots)
+        if features is None:
+            features = USUAL_FEATURES if batch is None else batch.features
         if is_own_set(features):
             load_features(features)
         if num_features(features) != self._num_features:
@@ -95,14 +98,14 @@ class Flown(LearnedPolicy):
                 f"the model sees {self._num_features} numbers of each robot, and the features "
                 f'{features} are {num_features(features)}; name its own: Flown(..., features="...")'
             )
-        extractor = make_extractor(features, self.mission)
+        extractor = make_extractor(features, mission)
         super().__init__(
             extractor,
             is_deterministic=is_deterministic or _is_greedy(model),
             own_features=features if is_own_set(features) else "",
         )
         self._model = model
-        self._normalize = normalize or model.get_vec_normalize_env()
+        self._normalize = model.get_vec_normalize_env() if normalize is None else normalize
         self.uses = f"{extractor.uses}, by a network that {type(model).__name__} trained"
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:

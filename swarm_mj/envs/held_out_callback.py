@@ -61,8 +61,8 @@ class HeldOutCallback(BaseCallback):
                 ends so. Beside it, with the ending `.pkl`, stand the averages of `VecNormalize`,
                 if the model has it. None keeps no model.
             features: As of `Flown`.
-            is_deterministic: Whether robots take the most probable recipient. Most models then
-                are silent.
+            is_deterministic: Whether robots take the most probable recipient, not a draw. It is
+                often silence for all.
 
         Raises:
             ValueError: If a number is below 1. When training begins, it raises what `Flown` and

@@ -95,7 +95,7 @@ def make_batch(
     for task in get_args(Task):
         if mission == environment_id(task):
             raise ValueError(
-                f"{mission!r} is a name of gymnasium.make; did you mean {task!r}, the mission's task?"
+                f"{mission!r} is a name for gymnasium.make; did you mean {task!r}, the task?"
             )
     if "seed" in fields:
         raise TypeError("seed is no option of an environment; give it to reset(seed=...)")

@@ -166,17 +166,7 @@ def make_policy_with(arguments: PolicyArguments, name: str, mission: Mission) ->
     check_kind("policy", name, str, '"planner"')
     check_kind("mission", mission, Mission, 'paper("flocking")')
     name = flown_name(name, mission)
-    if name.endswith(".zip") and not os.path.isdir(name):
-        raise ValueError(
-            f"policy {name} seems to be a model of stable-baselines3: store it with "
-            "swarm_mj.envs.sb3.save_policy, or fly it with swarm_mj.envs.sb3.Flown"
-        )
-    if not (name in POLICIES or is_stored(name) or is_own_policy(name)):
-        raise ValueError(
-            f"policy must be one of {', '.join(POLICIES)}, a run's folder or a {SUFFIX} file with "
-            f"a learned policy, or module:Name of your own, not {name!r}"
-            f"{did_you_mean(name, POLICIES)}"
-        )
+    _check_known(name)
     probability = arguments.probability
     if probability is not None and name not in HAVE_PROBABILITY:
         per_value = "name one policy per value in its file, as `p01 = functools.partial(Mine, 0.1)`"
@@ -196,6 +186,21 @@ def make_policy_with(arguments: PolicyArguments, name: str, mission: Mission) ->
     if probability is None:
         probability = tuned_probability(name, mission)
     return kind.with_probability(mission, probability)
+
+
+def _check_known(name: str) -> None:
+    """Raise ValueError for a name that no policy can have."""
+    if name.endswith(".zip") and not os.path.isdir(name):
+        raise ValueError(
+            f"policy {name} seems to be a model of stable-baselines3: store it with "
+            "swarm_mj.envs.sb3.save_policy, or fly it with swarm_mj.envs.sb3.Flown"
+        )
+    if not (name in POLICIES or is_stored(name) or is_own_policy(name)):
+        raise ValueError(
+            f"policy must be one of {', '.join(POLICIES)}, a run's folder or a {SUFFIX} file with "
+            f"a learned policy, or module:Name of your own, not {name!r}"
+            f"{did_you_mean(name, POLICIES)}"
+        )
 
 
 def _learned(arguments: PolicyArguments, name: str, mission: Mission) -> Policy:

@@ -144,6 +144,7 @@ def test_a_model_that_was_read_back_needs_its_mission(tmp_path):
     np.testing.assert_array_equal(by_flight(again, [3]), by_flight(Flown(model), [3]))
 
 
+@pytest.mark.slow
 def test_it_flies_by_a_name_of_ones_own_from_the_command_line(here, forks):
     trained(team()).save("model.zip")
     (here / "own.py").write_text(

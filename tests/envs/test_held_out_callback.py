@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 import torch
+from channels import Lossy
 from stable_baselines3 import PPO
 from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.vec_env import VecNormalize
@@ -67,9 +68,12 @@ def test_unless_the_policy_changes_an_evaluation_repeats_itself():
     assert len(set(ages)) == 1
 
 
-def test_training_is_the_same_without_it():
+@pytest.mark.parametrize("channel", [None, Lossy()])
+def test_training_is_the_same_without_it(channel):
+    """Also where the channel draws: evaluations have another one of the kind."""
+
     def weights(callback):
-        model = new_model()
+        model = new_model(channel=channel)
         model.learn(3 * ROLLOUT, callback=callback)
         return model.policy.state_dict()
 

@@ -22,7 +22,7 @@ SMALL = {"num_robots": 3, "num_windows": 5}
 
 RESET = {"options": {"mask": 1}}
 REFUSED = {
-    "'swarm_mj/RandomWalk-v0' is a name of gymnasium.*; did you mean 'random-walk'": lambda: (
+    "'swarm_mj/RandomWalk-v0' is a name for gymnasium.*; did you mean 'random-walk'": lambda: (
         make_batch("swarm_mj/RandomWalk-v0")
     ),
     "one of .*; did you mean random-walk": lambda: make_batch("random_walk"),

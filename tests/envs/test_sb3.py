@@ -57,7 +57,7 @@ def test_maskable_ppo_learns():
         ({"agent": "team", "reward": "credit"}, "choose reward aoi"),
         ({"num_envs": 3}, "has no 'num_envs'; did you mean num_missions"),
         ({"n_envs": 3}, "has no 'n_envs'; did you mean num_missions"),
-        ({"render_mode": "rgb_array"}, r"has no 'render_mode', .* Flown\(model\)"),
+        ({"render_mode": "rgb_array"}, r"has no 'render_mode', .*Flown\(model\)"),
     ],
 )
 def test_refusals(options, message):
