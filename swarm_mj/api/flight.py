@@ -89,7 +89,7 @@ class LiveShow(Protocol):
 Shows: TypeAlias = Callable[[Recorder, Mapping[str, Any]], LiveShow]
 
 
-class Flown(NamedTuple):
+class FinishedFlight(NamedTuple):
     """A mission flown, its record if there is one, and how the flight ended."""
 
     run: Run  # whose log is not made yet
@@ -106,7 +106,7 @@ class Flown(NamedTuple):
 
 def fly_mission(
     flight: Flight, *, console: Console, way_on: str | None, shows: Shows | None = None
-) -> Flown:
+) -> FinishedFlight:
     """Fly a mission from the first window to the last.
 
     Args:
@@ -152,7 +152,7 @@ def fly_mission(
     )
     if ending:
         ending += f" after {len(windows)} of {mission.num_windows} windows"
-    return Flown(run=run, recorder=recorder, code=code, ending=ending)
+    return FinishedFlight(run=run, recorder=recorder, code=code, ending=ending)
 
 
 class _Watch(NamedTuple):
