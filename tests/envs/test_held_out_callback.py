@@ -1,5 +1,7 @@
 """Evaluations while a model learns: always the same missions, and the best model is kept."""
 
+import signal
+
 import numpy as np
 import pytest
 import torch
@@ -9,6 +11,7 @@ from stable_baselines3.common.logger import KVWriter, Logger
 from stable_baselines3.common.vec_env import VecNormalize
 
 import swarm_mj
+from swarm_mj.envs import held_out_callback
 from swarm_mj.envs.sb3 import Flown, HeldOutCallback, make_vec_env
 
 torch.set_num_threads(1)
@@ -137,3 +140,18 @@ def test_another_environments_model_is_refused_before_it_learns():
     with pytest.raises(ValueError, match="trained on another environment"):
         model.learn(8, callback=HeldOutCallback())
     assert model.num_timesteps == 0
+
+
+def test_ctrl_c_parts_no_model_from_its_averages(tmp_path, monkeypatch):
+    write = held_out_callback.write_bytes
+
+    def interrupted(path, content):
+        if path.suffix == ".zip":
+            signal.raise_signal(signal.SIGINT)
+        write(path, content)
+
+    monkeypatch.setattr(held_out_callback, "write_bytes", interrupted)
+    model = new_model(normalises=True)
+    with pytest.raises(KeyboardInterrupt):
+        model.learn(ROLLOUT, callback=HeldOutCallback(num_missions=2, best_path=tmp_path / "best"))
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["best.pkl", "best.zip"]
