@@ -19,7 +19,7 @@ ORACLE = "lookahead-oracle"
 REFERENCES = {
     "tdma": "robots take turns that were agreed beforehand",
     "spatial-tdma": "robots that believe themselves far apart share a turn",
-    ORACLE: "knows where all robots are and what they know",
+    ORACLE: "knows where all robots are and what they know, and plans ahead",
 }
 # Of runs that began with 1.0: they are compared with it as before, also when they are resumed.
 FORMER_ORACLE = "greedy-oracle"
