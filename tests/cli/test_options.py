@@ -153,7 +153,7 @@ def test_help_breaks_no_name_and_names_only_groups_of_what_it_leaves_out(capsys)
         re.split(r"[,\s]+", capsys.readouterr().out)
     )
     assert main(["study", "--help"]) == 0
-    assert capsys.readouterr().out.endswith("\nswarm-mj study --help-all shows 7 more\n")
+    assert capsys.readouterr().out.endswith("\nswarm-mj study --help-all shows 8 more\n")
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -90,9 +90,11 @@ def test_fields_that_are_no_options_can_be_set_and_swept(read):
 
 def test_other_policies_may_fly_a_studys_missions(succeed, refusal, tmp_path):
     (tmp_path / "s.toml").write_text(SMALL + MISSION)
-    succeed("study", "run", "s.toml", "--policy", "tdma", "aloha", "--json", "other.json")
-    header = json.loads((tmp_path / "other.json").read_text())["study"]
-    assert header["policies"] == ["tdma", "aloha"]
+    succeed("study", "run", "s.toml", "--policy", "tdma", "aloha", "--parquet", "other.parquet")
+    assert list(pd.read_parquet(tmp_path / "other.parquet")["policy"]) == [
+        *["tdma"] * 2,
+        *["aloha"] * 2,
+    ]
     refused = refusal("study", "run", "s.toml", "--policy", "tmda")
     assert "did you mean tdma?" in refused
 
