@@ -22,7 +22,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import PlannerSettings
-from swarm_mj.policies.policy import CentralisedPolicy
+from swarm_mj.policies.policy import CentralisedPolicy, two_broadcasts
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, observe_own
 from swarm_mj.protocol.window import LocalViews
@@ -60,10 +60,7 @@ class Annealed(CentralisedPolicy):
 
     def window(self, mission: Mission) -> DoubleBroadcast:
         """Return what the robots do in a window: they broadcast twice, unanswered."""
-        return DoubleBroadcast(
-            silence_is_attempt=mission.silence_is_attempt,
-            needs_addressees=mission.half_duplex == "eavesdroppers",
-        )
+        return two_broadcasts(mission)
 
     def inform(self, truth: TrueLinks) -> None:
         """Search with the true channel from now on."""

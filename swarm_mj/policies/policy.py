@@ -179,6 +179,18 @@ class DecentralisedPolicy(Policy, ABC):
         """
 
 
+def two_broadcasts(mission: Mission) -> DoubleBroadcast:
+    """Return the window of policies that broadcast twice, unanswered, in a mission.
+
+    Args:
+        mission: As in `BroadcastPolicy.window`.
+    """
+    return DoubleBroadcast(
+        silence_is_attempt=mission.silence_is_attempt,
+        needs_addressees=mission.half_duplex == "eavesdroppers",
+    )
+
+
 class BroadcastPolicy(DecentralisedPolicy):
     """A decentralised policy whose packets are for everyone who hears them (IV-C).
 
@@ -201,10 +213,7 @@ class BroadcastPolicy(DecentralisedPolicy):
         Returns:
             The form of a window, which `Swarm` plays.
         """
-        return DoubleBroadcast(
-            silence_is_attempt=mission.silence_is_attempt,
-            needs_addressees=mission.half_duplex == "eavesdroppers",
-        )
+        return two_broadcasts(mission)
 
     @abstractmethod
     def transmits(self, views: LocalViews) -> Bool[np.ndarray, "B N"]:

@@ -10,7 +10,7 @@ from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
 SHIPPED_GNN = Listed(
     name="gnn",
     origin=FromPaper(section="III"),
-    rank=140,
+    rank=150,
     uses=f"{ExtendedFeatures.uses}, by a trained graph neural network",
     beyond=(
         Information.COMMON_ORDER,

@@ -136,6 +136,11 @@ def problem_of(links: Links, settings: PlannerSettings, *, is_certain: bool) -> 
     )
 
 
+def over_other_links(problem: Problem, links: Links) -> Problem:
+    """Return the same problem a little later, with the weights that it had: they take longest."""
+    return problem._replace(links=links, lone=lone_probabilities(links))
+
+
 def _min_share(links: Links, lone: Float[np.ndarray, "N N"], settings: PlannerSettings) -> float:
     """Return the share of a slot's value that must remain when another robot transmits.
 
