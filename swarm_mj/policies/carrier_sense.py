@@ -203,13 +203,18 @@ class AgeGainCsma(SensingPolicy):
         self._known = known
 
 
-def _in_turn(views: LocalViews, turn: int) -> Contention:
-    """Return the contention of a turn: its owners do not listen, and all others are silent.
+def turn_owners(num_robots: int, turn: int) -> Bool[np.ndarray, "N"]:
+    """Return who owns a turn, by its number.
 
-    A robot owns a turn if its identity and the turn's number are equal modulo `NUM_TURNS`.
+    It is the robots whose identity and the turn's number are equal modulo `NUM_TURNS`.
     """
-    num_turns = min(views.num_robots, NUM_TURNS)
-    is_owner = views.silence % num_turns == turn % num_turns
+    num_turns = min(num_robots, NUM_TURNS)
+    return np.arange(num_robots) % num_turns == turn % num_turns
+
+
+def _in_turn(views: LocalViews, turn: int) -> Contention:
+    """Return the contention of a turn: its owners do not listen, and all others are silent."""
+    is_owner = np.broadcast_to(turn_owners(views.num_robots, turn), views.silence.shape)
     minislot = np.where(is_owner, 0.0, np.inf)
     return Contention(minislot, np.full_like(minislot, np.inf))
 

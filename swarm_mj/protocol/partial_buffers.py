@@ -38,11 +38,11 @@ def entries_sent(buffers: Buffers, recipient: Int[np.ndarray, "B N"]) -> Float[n
     """
     if not isinstance(buffers, PartialBuffers):
         return buffers.timestamp
-    return _choose(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent)
+    return choose_entries(buffers.timestamp, recipient, buffers.num_entries, buffers.last_sent)
 
 
 @compiled()
-def _choose(
+def choose_entries(
     timestamp: Float[np.ndarray, "B N N"],
     recipient: Int[np.ndarray, "B N"],
     num_entries: int,

@@ -1,0 +1,144 @@
+"""The numbers of `index-csma` that are learned: by name, and in a row for the search that finds them.
+
+A feature's weights are linear, so each can be read: the index of a robot whose feature rises by one
+rises by the feature's weight, in octaves of news.
+"""
+
+from collections.abc import Sequence
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+NUM_SHIFTS = 6  # slots after which the usual shifts of the sensed power begin anew
+
+
+class Features(NamedTuple):
+    """What a robot sees of itself, each about 0 in a usual moment and of the size 1."""
+
+    neighbours: float  # octaves of their number
+    since_sent: float  # octaves of the time since its own last packet
+    edge: float  # 0.5 at the edge of the robots that it knows, -0.5 amid them
+    age: float  # octaves of the mean age of its buffer
+    sent: float  # share of the last slots or so in which it sent
+    decoded: float  # share of the last slots or so in which it decoded a packet
+    team: float  # octaves of the size of the team
+    one_neighbour: float  # octaves of the largest share that one neighbour has of the gain
+    crowd: float  # neighbours over the size of the team
+    news: float  # octaves of what it learned since its last packet, over the gain
+
+
+FEATURES = Features._fields
+NUM_FEATURES = len(FEATURES)
+
+
+class Weights(NamedTuple):
+    """The learned numbers of B missions, which may differ in them.
+
+    A team flies with one row. While numbers are searched for, those of every candidate fly side by
+    side.
+    """
+
+    success: Float[np.ndarray, "B 1"]  # trust in a neighbour of whom nothing is noted yet
+    believed: Float[np.ndarray, "B 1"]  # by which trust moves when an answer comes
+    doubted: Float[np.ndarray, "B 1"]  # by which it falls when none comes
+    stranger: Float[np.ndarray, "B 1"]  # weight of the gain of robots never heard of
+    first: Float[np.ndarray, "B 1"]  # index from which a robot begins in the first minislot
+    octaves: Float[np.ndarray, "B 1"]  # of the index, between the first minislot and the last
+    drawn: Float[np.ndarray, "B 1"]  # share of the minislots that a draw adds at most
+    threshold: Float[np.ndarray, "B 1"]  # octaves of gain below which a robot is silent
+    softness: Float[np.ndarray, "B 1"]  # of that, the scale of a logistic draw [octaves]
+    shift_db: Float[np.ndarray, "B S"]  # by which a channel may be louder, slot by slot [dB]
+    index: Float[np.ndarray, "B F"]  # of features in the index [octaves]
+    silence: Float[np.ndarray, "B F"]  # in the gain that counts for silence [octaves]
+    sensing_db: Float[np.ndarray, "B F"]  # in the power that it takes for a busy channel [dB]
+
+
+# Where a search begins: what a shorter one had come to, rounded, with no feature for sensing.
+START = Weights(
+    success=np.array([[0.75]]),
+    believed=np.array([[0.3]]),
+    doubted=np.array([[0.1]]),
+    stranger=np.array([[3.0]]),
+    first=np.array([[3.0]]),
+    octaves=np.array([[8.0]]),
+    drawn=np.array([[0.06]]),
+    threshold=np.array([[-1.0]]),
+    softness=np.array([[0.1]]),
+    shift_db=np.array([[4.0, 2.0, 1.0, 0.0, 0.0, 0.0]]),
+    index=np.array([[0.3, 0.2, 0.4, -0.6, 0.4, 0.3, 0.9, 0.0, -0.7, 0.1]]),
+    silence=np.zeros((1, NUM_FEATURES)),
+    sensing_db=np.zeros((1, NUM_FEATURES)),
+)
+# The size of a step that is worth a try, number by number.
+STEPS = Weights(
+    success=np.array([[0.1]]),
+    believed=np.array([[0.1]]),
+    doubted=np.array([[0.05]]),
+    stranger=np.array([[1.0]]),
+    first=np.array([[0.7]]),
+    octaves=np.array([[1.0]]),
+    drawn=np.array([[0.03]]),
+    threshold=np.array([[0.6]]),
+    softness=np.array([[0.2]]),
+    shift_db=np.full((1, NUM_SHIFTS), 1.5),
+    index=np.full((1, NUM_FEATURES), 0.15),
+    silence=np.full((1, NUM_FEATURES), 0.25),
+    sensing_db=np.full((1, NUM_FEATURES), 0.7),
+)
+# What numbers may be; all others are free.
+LEAST = {"success": 0.3, "believed": 0.0, "doubted": 0.0, "stranger": 0.5, "octaves": 2.0, "drawn": 0.0, "softness": 0.0}
+MOST = {"success": 1.0, "believed": 1.0, "doubted": 0.5, "octaves": 24.0, "drawn": 1.0}
+NUMBERS = sum(values.shape[1] for values in START)
+
+
+def flat(weights: Weights) -> Float[np.ndarray, "B D"]:
+    """Return all numbers of each row, side by side in the order of the fields."""
+    return np.concatenate(weights, axis=1)
+
+
+def from_flat(numbers: Float[np.ndarray, "B D"]) -> Weights:
+    """Return what `flat` was made of, with each number moved to what it may be."""
+    ends = np.cumsum([values.shape[1] for values in START])
+    fields = np.split(np.asarray(numbers, dtype=np.float64), ends[:-1], axis=1)
+    parts: list[np.ndarray] = []
+    for name, values in zip(Weights._fields, fields, strict=True):
+        bounded = np.clip(values, LEAST.get(name, -np.inf), MOST.get(name, np.inf))
+        if name == "silence":
+            # A team's size is no reason to be silent: teams larger than any trained on never began.
+            bounded[:, FEATURES.index("team")] = 0.0
+        parts.append(np.ascontiguousarray(bounded))
+    return Weights(*parts)
+
+
+def repeated(weights: Weights, num_missions: int) -> Weights:
+    """Return the same for this many missions: each row as often as the others, one by one."""
+    times, rest = divmod(num_missions, len(weights.first))
+    if rest:
+        raise ValueError(
+            f"{num_missions} missions cannot fly as often by each of {len(weights.first)} rows"
+        )
+    return Weights(*(np.repeat(values, times, axis=0) for values in weights))
+
+
+def by_name(weights: Weights) -> dict[str, dict[str, float] | list[float] | float]:
+    """Return the first row as plain numbers by their names, for a file that people read."""
+    named: dict[str, dict[str, float] | list[float] | float] = {}
+    for name, values in weights._asdict().items():
+        row = [float(value) for value in values[0]]
+        if len(row) == NUM_FEATURES:
+            named[name] = dict(zip(FEATURES, row, strict=True))
+        else:
+            named[name] = row if len(row) > 1 else row[0]
+    return named
+
+
+def from_names(named: dict[str, dict[str, float] | Sequence[float] | float]) -> Weights:
+    """Return what `by_name` was made of; KeyError if a number is missing."""
+    rows: list[np.ndarray] = []
+    for name in Weights._fields:
+        value = named[name]
+        if isinstance(value, dict):
+            value = [value[feature] for feature in FEATURES]
+        rows.append(np.atleast_1d(np.asarray(value, dtype=np.float64))[None])
+    return Weights(*rows)
