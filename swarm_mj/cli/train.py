@@ -171,6 +171,8 @@ def _sweep(options: TrainOptions, path: Path) -> int:
 def asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
+    if options.device is not None and run.training.policy != "gnn":
+        raise ValueError(f"--device is of training a gnn, not of {run.training.policy}; leave it out")
     device = options.device or run.device
     run = replace(run, limits=asked_limits(run.limits, options), device=device)
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)
@@ -195,9 +197,14 @@ def _new_run(options: TrainOptions) -> TrainingRun:
     run_folder.check_new(options.out)
     init = options.init
     given = options.settings
-    training = train_settings.asked_settings(given, read_policy(init)[1] if init else None, init)
-    credit = training.credit_assignment
-    limits = Limits(decisions=run_folder.BUDGETS[credit], patience=run_folder.PATIENCE[credit])
+    begun_with = None
+    if init is not None and given.get("policy", "gnn") == "gnn":
+        begun_with = read_policy(init)[1]
+    elif init is not None:
+        raise ValueError("--init begins with a gnn, not with an index; leave it out")
+    training = train_settings.asked_settings(given, begun_with, init)
+    way = training.policy if training.policy != "gnn" else training.credit_assignment
+    limits = Limits(decisions=run_folder.BUDGETS[way], patience=run_folder.PATIENCE[way])
     command = shlex.join(["swarm-mj", "train", *options.typed])
     return TrainingRun(training=training, limits=limits, command=command, init=init)
 
@@ -216,7 +223,9 @@ def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
 def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) -> None:
     training = asked.training
     console = plain_console()
-    credit = training.credit_assignment
+    what = f"credit per {training.credit_assignment}"
+    if training.policy != "gnn":
+        what = f"{training.policy} by evolution"
     sizes = ", ".join(map(str, training.robots))
     tasks = ", ".join(values_of("task", training.all_missions))
     rows = {
@@ -225,7 +234,7 @@ def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) 
         "minutes": f"{progress.minutes:.1f}",
         "its policy": str(out / POLICY) if progress.best else "none yet",
     }
-    title = f"{out}: credit per {credit}, {tasks}, {sizes} robots"
+    title = f"{out}: {what}, {tasks}, {sizes} robots"
     console.print(named_values(title, rows))
     for line in verdicts(asked, progress):
         console.print(line)

@@ -19,7 +19,8 @@ from swarm_mj.learning.selection import (
 from swarm_mj.protocol.mission_costs import AOI, MissionCost
 from swarm_mj.system.terminal import WorkBar
 
-FINISHING = "finishing this rollout, then all is kept; Ctrl-C again breaks off at once"
+FINISHING = "finishing this {}, then all is kept; Ctrl-C again breaks off at once"
+STEPS = {"gnn": "rollout", "index-csma": "generation"}  # after which a run may stop
 CLEAR = 2.0  # standard errors of a difference that is not due to chance
 NAMES = {"first": "the policy it began with"}
 
@@ -51,7 +52,8 @@ class Watch(WorkBar):
         self.move_to(share_done(progress, self._run.limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
-            self._console.print(f"Interrupted: {FINISHING}.")
+            step = STEPS[self._run.training.policy]
+            self._console.print(f"Interrupted: {FINISHING.format(step)}.")
         return not self.has_stopped
 
     @property
@@ -88,7 +90,7 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
     for name, each in choice.others.items():
         known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
         rows[NAMES.get(name, name)] = _amount(each, cost) + known
-    if ORACLE not in choice.others and max(training.robots) > selection.ORACLE_ROBOTS:
+    if ORACLE not in choice.others and training.most_robots > selection.ORACLE_ROBOTS:
         too_many = f"more than {selection.ORACLE_ROBOTS} robots"
         rows[ORACLE] = f"not flown: it would take long with {too_many}"
     return rows

@@ -19,7 +19,14 @@ from swarm_mj.cli.mission_options import (
     values_of,
 )
 from swarm_mj.cli.options import Given, Option, flags_of
-from swarm_mj.learning.settings import TURNLESS_SILENCE, PpoSettings, Training, usual_settings
+from swarm_mj.learning.settings import (
+    INDEX_EVALUATED_EVERY,
+    TURNLESS_SILENCE,
+    PpoSettings,
+    Training,
+    usual_index_settings,
+    usual_settings,
+)
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
@@ -29,6 +36,8 @@ from swarm_mj.policies.gnn.feature_sets import (
     load_features,
     num_features,
 )
+from swarm_mj.policies.index.policy import IndexCsma
+from swarm_mj.policies.index.weights import START
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.simulation.components import GROUP, Components
@@ -45,6 +54,11 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
         "missions, trained on together for several values (not of --windows)",
     ),
 }
+
+
+INDEX = "index-csma"
+# What counts for the search of an index, beside missions and parts: credit, networks and PPO do not.
+OF_INDEX = ("policy", "robots", "missions", "train_windows", "seed", "evaluate_every", "held_out")
 
 
 def _specs() -> dict[str, Field[Any]]:
@@ -94,6 +108,8 @@ def asked_settings(
     `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
     own = _part("", given)
+    if own.get("policy") == INDEX:
+        return _index_settings(given)
     network = _part("network", given)
     ppo = _part("ppo", given)
     sizes = own.get("robots", (Mission().num_robots,))
@@ -128,6 +144,35 @@ def asked_settings(
         rule = "reward velocity-variance depends on who talks only if the robots flock"
         raise ValueError(f"{rule}; add --task flocking")
     return training
+
+
+def _index_settings(given: Given) -> Training:
+    """Return the settings of a search for an index; ValueError for options that are of networks."""
+    check_of_index(given)
+    own = _part("", given)
+    sizes = own.get("robots", (Mission().num_robots,))
+    mission, *others = _missions(_part("mission", given), sizes[0])
+    training = usual_index_settings(mission, sizes)
+    training = replace(
+        training,
+        other_missions=tuple(others),
+        components=Components(**_part("components", given)),
+        missions=max(training.missions, len(sizes) * (len(others) + 1)),
+    )
+    training = replace(training, **own)
+    load_own(training.features, "", training)
+    for kind in training.kinds:
+        IndexCsma(kind, START)  # whose packets may fit into no slot
+    return training
+
+
+def check_of_index(given: Given) -> None:
+    """Raise ValueError for an option that counts for networks only."""
+    for place in given:
+        owner, _, name = place.rpartition(".")
+        if not (owner in ("mission", "components") or name in OF_INDEX and not owner):
+            flag = flags_of(SPECS[place])[0]
+            raise ValueError(f"{flag} is of training a gnn, not of index-csma; leave it out")
 
 
 def _usual_silence(own: Given, training: Training) -> Given:

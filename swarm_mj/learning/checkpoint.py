@@ -64,7 +64,7 @@ def save(
         "version": CHECKPOINT_VERSION,
         "training": json.dumps(asdict(training)),
         "feature_names": list(known_names(training.features)),
-        "progress": asdict(progress) | {"curve": [row.columns() for row in progress.curve]},
+        "progress": written_progress(progress),
         "weights": model.policy.state_dict(),
         "adam": model.policy.optimizer.state_dict()["state"],  # its settings are the training's
         "normaliser": normaliser,
@@ -94,19 +94,32 @@ def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks
     version, of other settings, or of features that are others now.
     """
     state: Any = read_torch(path)
-    with _as_damaged(path):
+    with as_damaged(path):
         if state["version"] != CHECKPOINT_VERSION:
             raise ValueError("another version of swarm_mj wrote it, which can go on with it")
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
         trained_on = tuple(state.get("feature_names", ()))  # none in those of 1.0.0
     check_unchanged(training.features, trained_on, f"checkpoint {path}")
-    with _as_damaged(path):
+    with as_damaged(path):
         return restore(state, model)
 
 
+def written_progress(progress: Progress) -> dict[str, Any]:
+    """Return a run's progress as plain values."""
+    return asdict(progress) | {"curve": [row.columns() for row in progress.curve]}
+
+
+def read_progress(stored: dict[str, Any]) -> Progress:
+    """Return what `written_progress` was made of; raises any Exception for what is none."""
+    progress = read_plain(stored | {"curve": []}, Progress)
+    curve = read_plain({"rows": stored["curve"]}, _Curve)
+    progress.curve = [curve_row_of(row) for row in curve.rows]
+    return progress
+
+
 @contextmanager
-def _as_damaged(path: Path) -> Iterator[None]:
+def as_damaged(path: Path) -> Iterator[None]:
     """Turn whatever goes wrong into a ValueError that names the checkpoint and the way out."""
     try:
         yield
@@ -121,10 +134,7 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
 
     Raises any Exception if a part is missing, or does not fit the model.
     """
-    stored = state["progress"]
-    progress = read_plain(stored | {"curve": []}, Progress)
-    curve = read_plain({"rows": stored["curve"]}, _Curve)
-    progress.curve = [curve_row_of(row) for row in curve.rows]
+    progress = read_progress(state["progress"])
     env = env_of(model)
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
     networks = Networks()

@@ -43,7 +43,7 @@ class GraphVecEnv(SwarmVecEnv):
         # A scale for each kind of mission, which its batches share; none if credits are not scaled.
         num_scales = len(training.kinds) if training.credit_scaling == "kind" else 0
         self.credit_scales = [CreditScale() for _ in range(num_scales)]
-        self.num_nodes = max(training.robots)  # of every graph
+        self.num_nodes = training.most_robots  # of every graph
         if self.agent == "team" and training.reward == "aoi":
             self.reward_unit = float(training.mission.num_windows)
         self._least_windows = training.least_windows

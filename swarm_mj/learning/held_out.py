@@ -39,15 +39,19 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.gnn.policy import GnnPolicy
+from swarm_mj.policies.index.policy import IndexCsma
+from swarm_mj.policies.index.weights import Weights
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
+from swarm_mj.protocol.packet_counts import arrived
 from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 
 Flown = list[BatchCosts]  # by kind of mission
 Samples = list[Float[np.ndarray, "B"]]  # by kind of mission
+Acting = Network | Weights  # what is trained, and decides
 MakePolicy = Callable[[Mission], Policy]
 OnWindow = Callable[[float], None]
 
@@ -78,8 +82,10 @@ class Flights:
             self.on_window(self.num_windows / in_all)
 
 
-def held_out_policy(training: Training, network: Network, mission: Mission) -> GnnPolicy:
+def held_out_policy(training: Training, network: Acting, mission: Mission) -> Policy:
     """Return the policy under training, as it flies."""
+    if isinstance(network, Weights):
+        return IndexCsma(mission, network)
     extractor = make_extractor(training.features, mission)
     return GnnPolicy(
         network,
@@ -91,7 +97,7 @@ def held_out_policy(training: Training, network: Network, mission: Mission) -> G
 
 def evaluate(
     training: Training,
-    network: Network,
+    network: Acting,
     references: References | None = None,
     on_window: OnWindow = lambda _share: None,
 ) -> tuple[HeldOutCosts, Columns]:
@@ -99,7 +105,7 @@ def evaluate(
 
     Args:
         training: The settings of the run.
-        network: It flies; its weights are not changed.
+        network: It flies, or an index does; its weights are not changed.
         references: What `fly_references` has returned: policies to compare with, pair by pair.
         on_window: It is called after every window with the share flown.
 
@@ -146,7 +152,7 @@ def reference_columns(references: References) -> Columns:
 def choose(
     training: Training,
     curve: Sequence[CurveRow],
-    networks: Mapping[int, Network],  # the candidates', by the decisions behind them
+    networks: Mapping[int, Acting],  # the candidates', by the decisions behind them
     on_window: OnWindow,
 ) -> tuple[Choice, HeldOutCosts]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
@@ -206,7 +212,7 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
     }
 
 
-def record_first(training: Training, network: Network, on_window: OnWindow) -> Recorder:
+def record_first(training: Training, network: Acting, on_window: OnWindow) -> Recorder:
     """Fly the first held-out mission, as evaluations do; return its record."""
     mission = training.kinds[0]
     swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
@@ -222,7 +228,7 @@ def recorded_of(training: Training, decisions: int) -> dict[str, int]:
     return {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed}
 
 
-def record_replay(training: Training, network: Network, decisions: int, folder: Path) -> None:
+def record_replay(training: Training, network: Acting, decisions: int, folder: Path) -> None:
     """Record the first held-out mission, as the network flies it after this many team decisions."""
     from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
@@ -241,7 +247,9 @@ def _means(training: Training, costs: Flown) -> HeldOutCosts:
     else:
         objective = variance
     sent = sum(float(each.packets_sent.sum()) for each in costs)
-    delivered = sum(float(each.packets_delivered.sum()) for each in costs)
+    delivered = 0.0
+    for each in costs:
+        delivered += float(arrived(each.packets_delivered, each.packets_heard).sum())
     num_windows = training.mission.num_windows * sum(each.aoi.size for each in costs)
     return HeldOutCosts(
         aoi=_mean(age),

@@ -20,10 +20,11 @@ from swarm_mj.learning.selection import (
     reference_ages,
 )
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
+from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import remembers_packets
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.replay_size import IN_MEMORY, ON_DISK
-from swarm_mj.simulation.memory import LIBRARIES, TORCH, learned_memory
+from swarm_mj.simulation.memory import LIBRARIES, TORCH, learned_memory, policy_memory
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.reading import read_document, read_file, read_rows
@@ -39,8 +40,9 @@ FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
 MAX_BYTES = 1_000_000  # of the settings
 MAX_CURVE_BYTES = 10_000_000
-BUDGETS = {"robot": 200_000, "team": 2_000_000}  # team decisions; the paper's for the paper's way
-PATIENCE = {"robot": 8, "team": 40}  # evaluations
+# Team decisions, by the credit or the policy; the paper's for the paper's way.
+BUDGETS = {"robot": 200_000, "team": 2_000_000, "index-csma": 2_000_000}
+PATIENCE = {"robot": 8, "team": 40, "index-csma": 8}  # evaluations
 KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
 WINDOW_BYTES = 2.0  # of the checkpoint, for each robot and window of a mission
 CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
@@ -56,7 +58,7 @@ class Limits:
         label="budget",
         low=1,
         high=MAX_DECISIONS,
-        shown=f"{BUDGETS['robot']}, team: {BUDGETS['team']}; none with --minutes",
+        shown=f"{BUDGETS['robot']}, team and index-csma: {BUDGETS['team']}; none with --minutes",
     )
     minutes: float | None = common_setting(
         None,
@@ -194,8 +196,10 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
 
     One that is shown while it goes on records a mission at a time, as replays do.
     """
+    if training.policy == "index-csma":
+        return _index_needs(training, limits, is_shown=is_shown)
     first = training.kinds[0]  # of the replays
-    size = max(training.robots)
+    size = training.most_robots
     rollout = rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS
     num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
@@ -205,6 +209,29 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - LIBRARIES - TORCH) + passes
     file = WINDOW_BYTES * training.missions * size * training.most_windows + CHECKPOINT_BYTES
+    return _with_replays(needs.Needs(memory=memory, file=file), first, limits, is_shown=is_shown)
+
+
+def _index_needs(training: Training, limits: Limits, *, is_shown: bool) -> needs.Needs:
+    """Estimate a search for an index: the missions of all kinds, and those that choose."""
+    flown = num_missions(training, limits.decisions or MAX_DECISIONS, 1 + OTHER_FLIGHTS)
+    num_kinds = len(training.kinds)
+    of_each = training.evolution.candidates * -(-training.missions // num_kinds)
+    memory = LIBRARIES + TORCH
+    largest = 0.0
+    for kind in training.kinds:  # their swarms stay, and missions begin anew in them
+        memory += policy_memory(training.policy, kind, of_each) - LIBRARIES
+        largest = max(largest, policy_memory(training.policy, kind, flown) - LIBRARIES)
+    made = needs.Needs(memory=memory + largest, file=CHECKPOINT_BYTES)
+    return _with_replays(made, training.kinds[0], limits, is_shown=is_shown)
+
+
+def _with_replays(
+    made: needs.Needs, first: Mission, limits: Limits, *, is_shown: bool
+) -> needs.Needs:
+    """Return the needs of a run with those of the replays of its first kind of mission."""
+    memory = made.memory
+    file = made.file
     if is_shown or limits.replay_every is not None:
         memory += IN_MEMORY.of(first, first.num_windows)
     if limits.replay_every is not None:
@@ -215,7 +242,7 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
 
 def rollout_bytes(training: Training) -> int:
     """Return the size of a run's largest arrays: the rollout, and the robots' packet memory."""
-    nodes = max(training.robots)
+    nodes = training.most_robots
     rows = training.missions * nodes  # a graph each
     graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
     remembered = 4 * nodes**2 if remembers_packets(training.features) else 0
@@ -224,7 +251,7 @@ def rollout_bytes(training: Training) -> int:
 
 def passes_bytes(training: Training) -> float:
     """Return the size of the activations that a minibatch keeps for its gradient."""
-    nodes = max(training.robots)
+    nodes = training.most_robots
     ppo = training.ppo
     shape = training.network
     rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches

@@ -12,6 +12,7 @@ from pathlib import Path
 from swarm_mj.learning.settings import Training
 from swarm_mj.protocol.costs import WindowCosts
 from swarm_mj.protocol.mission_costs import AOI, MissionCost
+from swarm_mj.protocol.packet_counts import arrived
 from swarm_mj.system.writing import write_csv
 
 ORACLE = "greedy-oracle"
@@ -132,8 +133,9 @@ class Accumulator:
         for costs in batches:
             self.decisions += len(costs.age_windows)
             self.age_windows += float(costs.age_windows.sum())
-            self.attempted += int(costs.packets.attempted.sum())
-            self.delivered += int(costs.packets.delivered.sum())
+            packets = costs.packets
+            self.attempted += int(packets.sent.sum())
+            self.delivered += int(arrived(packets.delivered, packets.heard).sum())
 
     def means(self) -> Columns:
         """Return means per mission and window; none before the first."""
@@ -234,7 +236,7 @@ def behind_column(name: str) -> str:
 
 def references_flown(training: Training) -> list[str]:
     """Return those of `REFERENCES` that fly a training's missions beside its policies."""
-    is_large = max(training.robots) > ORACLE_ROBOTS
+    is_large = training.most_robots > ORACLE_ROBOTS
     return [name for name in REFERENCES if not (is_large and name == ORACLE)]
 
 

@@ -20,6 +20,7 @@ from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import check, check_value, common_setting, setting
 from swarm_mj.system.user_code import files_named
 
+TrainedPolicy = Literal["gnn", "index-csma"]  # a network, by PPO; an index, by evolution
 CreditAssignment = Literal["robot", "team"]  # per robot, per team
 CreditScaling = Literal["none", "kind"]  # as they are, by what is usual in their kind of mission
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
@@ -32,6 +33,8 @@ TEST_SEED = 520_000  # of those that tell its cost
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
 # Where no turns let a robot speak, training begins sooner with one of 40 robots in seven speaking.
 TURNLESS_SILENCE = 5.5
+# A generation is thousands of decisions, so an evaluation every 10,000 would follow each of them.
+INDEX_EVALUATED_EVERY = 200_000
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
 MAX_DECISIONS = 10**12
 
@@ -107,6 +110,25 @@ class PpoSettings:
         check(self)
 
 
+@dataclass(frozen=True, kw_only=True)
+class EvolutionSettings:
+    """The search for the numbers of `index-csma`, by `evolution`.
+
+    Args:
+        candidates: Policies of a generation, which fly the same missions.
+        first_step: The size of its first steps, in the steps that `index.weights` calls worth a try.
+
+    Raises:
+        ValueError: A value is not of its kind, or out of its range.
+    """
+
+    candidates: int = setting(12, low=4, high=1000)
+    first_step: float = setting(0.5, low=1e-6, high=10.0)
+
+    def __post_init__(self) -> None:
+        check(self)
+
+
 # PPO with credit per team: III-C and, for what it leaves open, the authors' code.
 PAPER_TEAM_PPO = PpoSettings(
     learning_rate=1e-4,
@@ -139,11 +161,14 @@ class Training:
     The defaults are those of credit per robot, made to learn in minutes.
 
     Args:
+        policy: "gnn", a graph neural network that PPO trains, or "index-csma", whose numbers are
+            found by evolution; then what is of credit, networks and PPO counts for nothing.
         credit_assignment: "robot", each paid for what its own packets changed, or "team", one
             reward for all.
         mission: What is flown, except for the team's size.
         other_missions: What else is flown, as many windows long; all are trained on together.
-        robots: Sizes of the team, from 2 to `MAX_ROBOTS`; several are trained on together.
+        robots: Sizes of the team, from 2 to `MAX_ROBOTS`; several are trained on together. Without
+            any, each mission has its own size.
         features: What the network sees of each teammate: the name of a feature set, or
             `module:Name`.
         own_network: The class of the network, `module:Name`, if it is a user's own.
@@ -158,7 +183,8 @@ class Training:
         credit_scaling: Whether each kind of mission's credits per robot are divided by their root
             mean square of late, "kind", or not, "none".
         ppo: Settings of PPO.
-        missions: Missions flown side by side.
+        evolution: Settings of the search for an index.
+        missions: Missions flown side by side; of an index, by each candidate of a generation.
         train_windows: Windows after which missions in training begin anew, if they have more: a
             number, or the least and the most of a number drawn for each of them; none is when they
             end. Evaluations always fly whole missions.
@@ -177,6 +203,12 @@ class Training:
         True
     """
 
+    policy: TrainedPolicy = common_setting(
+        "gnn",
+        "what is trained: gnn, the network of --features and --network by PPO, or index-csma, whose "
+        "numbers are found by evolution",
+        choices=get_args(TrainedPolicy),
+    )
     credit_assignment: CreditAssignment = common_setting(
         "robot",
         "credit assignment, per robot (each is paid for what its own packets changed; learns in "
@@ -250,7 +282,10 @@ class Training:
         shown="kind with several tasks, ranges or channels, else none",
     )
     ppo: PpoSettings = PpoSettings()
-    missions: int = setting(16, "flown side by side", low=1, high=4096)
+    evolution: EvolutionSettings = EvolutionSettings()
+    missions: int = setting(
+        16, "flown side by side; index-csma: by each of its candidates", low=1, high=4096
+    )
     # The first windows are the hardest: who begins more often practises them more.
     train_windows: tuple[int, ...] = setting(
         (),
@@ -283,8 +318,8 @@ class Training:
     def __post_init__(self) -> None:
         check(self)
         check_fit(self.network, self.features)
-        if not self.robots:
-            raise ValueError("robots must have at least 1 size")
+        if self.policy == "index-csma" and self.cost is not AOI:
+            raise ValueError(f"reward {self.reward} is of a gnn; choose policy gnn, or reward aoi")
         if len(self.train_windows) > 2 or list(self.train_windows) != sorted(self.train_windows):
             given = " ".join(map(str, self.train_windows))
             raise ValueError(
@@ -317,10 +352,17 @@ class Training:
     @property
     def kinds(self) -> tuple[Mission, ...]:
         """The kinds of missions that are trained on together: each with each size of the team."""
+        if not self.robots:
+            return self.all_missions
         kinds: list[Mission] = []
         for mission in self.all_missions:
             kinds += [replace(mission, num_robots=num_robots) for num_robots in self.robots]
         return tuple(kinds)
+
+    @property
+    def most_robots(self) -> int:
+        """The size of the largest team."""
+        return max(mission.num_robots for mission in self.kinds)
 
     @property
     def least_windows(self) -> int:
@@ -355,6 +397,34 @@ class Training:
     def drops_silence(self) -> bool:
         """True if silent rows, which without discount have no credit, may be left out."""
         return self.credit_assignment == "robot" and self.ppo.discount == 0.0
+
+
+def usual_index_settings(mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
+    """Return the usual settings of a search for an index.
+
+    Args:
+        mission: What is flown.
+        robots: Sizes of the team; several are trained on together.
+        seed: The same seed is the same policy.
+
+    Returns:
+        The settings; `dataclasses.replace` changes some.
+
+    Raises:
+        ValueError: A value is unknown or out of range.
+
+    Example:
+        >>> usual_index_settings(paper("flocking"), [40]).evolution.candidates
+        12
+    """
+    return Training(
+        policy="index-csma",
+        mission=mission,
+        robots=tuple(robots),
+        seed=seed,
+        missions=4,
+        evaluate_every=INDEX_EVALUATED_EVERY,
+    )
 
 
 def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:

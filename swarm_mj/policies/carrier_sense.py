@@ -179,7 +179,7 @@ class AgeGainCsma(SensingPolicy):
         slot = int(slot_of(views.now)[0])  # the clocks of all missions are alike
         turn, place = divmod(slot, TURN_EVERY)
         if place == TURN_EVERY - 1:
-            return _in_turn(views, turn)
+            return in_turn(views, turn)
         return self._by_news()
 
     def _by_news(self) -> Contention:
@@ -203,18 +203,13 @@ class AgeGainCsma(SensingPolicy):
         self._known = known
 
 
-def turn_owners(num_robots: int, turn: int) -> Bool[np.ndarray, "N"]:
-    """Return who owns a turn, by its number.
+def in_turn(views: LocalViews, turn: int) -> Contention:
+    """Return the contention of a turn: its owners do not listen, and all others are silent.
 
-    It is the robots whose identity and the turn's number are equal modulo `NUM_TURNS`.
+    A robot owns a turn if its identity and the turn's number are equal modulo `NUM_TURNS`.
     """
-    num_turns = min(num_robots, NUM_TURNS)
-    return np.arange(num_robots) % num_turns == turn % num_turns
-
-
-def _in_turn(views: LocalViews, turn: int) -> Contention:
-    """Return the contention of a turn: its owners do not listen, and all others are silent."""
-    is_owner = np.broadcast_to(turn_owners(views.num_robots, turn), views.silence.shape)
+    num_turns = min(views.num_robots, NUM_TURNS)
+    is_owner = views.silence % num_turns == turn % num_turns
     minislot = np.where(is_owner, 0.0, np.inf)
     return Contention(minislot, np.full_like(minislot, np.inf))
 

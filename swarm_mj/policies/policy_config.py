@@ -8,6 +8,7 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features
+from swarm_mj.policies.index.weights import START
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.streams import check_printable
 
@@ -133,6 +134,19 @@ class MlpConfig(PolicyConfig):
         return self.network.features
 
 
+@dataclass(frozen=True, kw_only=True)
+class IndexConfig(PolicyConfig):
+    """All of the stored numbers of an `index-csma` but the numbers."""
+
+    @property
+    def tensors(self) -> dict[str, tuple[int, ...]]:
+        """The numbers' shapes by name: those of a row of `Weights`."""
+        return {name: values.shape[1:] for name, values in START._asdict().items()}
+
+
+StoredConfig = GnnConfig | MlpConfig | IndexConfig
+
+
 def check_fit(network: GnnShape, features: str) -> None:
     """Raise ValueError unless a network takes a feature set, and gives what decisions need."""
     _check_num_features(network.num_features, features)
@@ -152,8 +166,36 @@ def _check_num_features(given: int, features: str) -> None:
         )
 
 
-def model_card(config: GnnConfig | MlpConfig) -> str:
+def model_card(config: StoredConfig) -> str:
     """Return a README in Markdown: how to fly the policy, and all that the config holds."""
+    said = _index_said() if isinstance(config, IndexConfig) else _network_said(config)
+    return f"""\
+# A learned communication policy of swarm_mj
+
+{said}
+
+```json
+{json.dumps(asdict(config), indent=2)}
+```
+
+Licence: Apache-2.0, as swarm_mj.
+"""
+
+
+def _index_said() -> str:
+    """Return what a card says of the numbers of `index-csma`."""
+    return f"""\
+Every robot listens before it transmits, in the order of an index, as those of `index-csma` do; the
+file holds the index's numbers. Packets carry T, M and P, as the paper's, and nothing more.
+
+    swarm-mj fly --policy FILE --task stationary
+
+`FILE` is the `{SUFFIX}` file that holds this card; `swarm-mj evaluate` takes it too.
+Teams of any size fly with it; those unlike the ones that it was trained on may fare badly."""
+
+
+def _network_said(config: GnnConfig | MlpConfig) -> str:
+    """Return what a card says of a network."""
     kind = "a graph neural network (an Aggregation GNN)"
     teams = "Teams of any size fly with it; those much larger than trained on may fare badly."
     flags = [config.training.get("mission", {}).get("task", "TASK")]
@@ -167,8 +209,6 @@ def model_card(config: GnnConfig | MlpConfig) -> str:
     if is_own_set(config.features):
         flags.append(f"--features {config.features}")
     return f"""\
-# A learned communication policy of swarm_mj
-
 Every robot evaluates {kind} on the `{config.features}` features of its own
 buffer, and draws from the result which robot it addresses in the next window, or that it stays
 silent. Packets carry T, M and P, as the paper's, and nothing more.
@@ -176,11 +216,4 @@ silent. Packets carry T, M and P, as the paper's, and nothing more.
     swarm-mj fly --policy FILE --task {" ".join(flags)}
 
 `FILE` is the `{SUFFIX}` file that holds this card; `swarm-mj evaluate` takes it too.
-{teams}
-
-```json
-{json.dumps(asdict(config), indent=2)}
-```
-
-Licence: Apache-2.0, as swarm_mj.
-"""
+{teams}"""

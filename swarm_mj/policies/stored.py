@@ -20,8 +20,18 @@ from safetensors.numpy import save
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.gnn.policy import GnnPolicy, StoredGnn
+from swarm_mj.policies.index.policy import IndexCsma
+from swarm_mj.policies.index.weights import FEATURES, from_tensors
 from swarm_mj.policies.learned import LearnedPolicy, MlpPolicy
-from swarm_mj.policies.policy_config import SUFFIX, GnnConfig, MlpConfig, Weights, model_card
+from swarm_mj.policies.policy_config import (
+    SUFFIX,
+    GnnConfig,
+    IndexConfig,
+    MlpConfig,
+    StoredConfig,
+    Weights,
+    model_card,
+)
 from swarm_mj.system.packages import need
 from swarm_mj.system.reading import check_size, open_file, read_document, read_plain
 from swarm_mj.system.writing import write_bytes
@@ -32,7 +42,11 @@ if TYPE_CHECKING:  # policies are loaded without torch, which takes seconds to i
 POLICY = f"policy{SUFFIX}"  # the policy of a run, in its folder
 FORMAT = "swarm_mj policy"  # and the metadata's entry
 VERSION = 3  # 2, of swarm_mj 1.0.0, did not name the features
-CONFIGS = {"gnn": GnnConfig, "mlp": MlpConfig}
+CONFIGS: dict[str, type[StoredConfig]] = {
+    "gnn": GnnConfig,
+    "mlp": MlpConfig,
+    "index": IndexConfig,
+}
 MAX_BYTES = 64_000_000
 WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 
@@ -41,7 +55,7 @@ WAY_OUT = "copy it again, or make one with `swarm-mj train`"
 class _Metadata:
     """The entry of the metadata, without its format and version."""
 
-    kind: Literal["gnn", "mlp"]
+    kind: Literal["gnn", "mlp", "index"]
     config: dict[str, Any]
     card: str
     feature_names: tuple[str, ...]  # in order; none in files of 1.0.0
@@ -85,7 +99,7 @@ def save_gnn(path: Path, network: "Network", config: GnnConfig, card: str | None
 
 
 def save_weights(
-    path: Path, weights: Weights, config: GnnConfig | MlpConfig, card: str | None = None
+    path: Path, weights: Weights, config: StoredConfig, card: str | None = None
 ) -> Path:
     """Store a policy's weights by name, as `save_gnn` does; it returns and raises the same."""
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
@@ -93,8 +107,8 @@ def save_weights(
     said = {
         "format": FORMAT,
         "format_version": VERSION,
-        "kind": "gnn" if isinstance(config, GnnConfig) else "mlp",
-        "feature_names": feature_sets.known_names(config.features),
+        "kind": _kind_of(config),
+        "feature_names": _features_of(config),
         "config": asdict(config),
         "card": card or model_card(config),
     }
@@ -106,6 +120,19 @@ def save_weights(
     return path
 
 
+def _kind_of(config: StoredConfig) -> str:
+    """Return what the metadata calls a kind of policy."""
+    [kind] = [name for name, its in CONFIGS.items() if isinstance(config, its)]
+    return kind
+
+
+def _features_of(config: StoredConfig) -> Sequence[str]:
+    """Return the names of a policy's features, in order; none of a user's own that is unknown."""
+    if isinstance(config, IndexConfig):
+        return FEATURES
+    return feature_sets.known_names(config.features)
+
+
 def load_policy(
     path: Path,
     mission: Mission,
@@ -113,7 +140,7 @@ def load_policy(
     is_deterministic: bool = False,
     features: Sequence[str] = (),
     networks: Sequence[str] = (),
-) -> LearnedPolicy:
+) -> LearnedPolicy | IndexCsma:
     """Return a stored policy, ready to fly.
 
     Args:
@@ -140,6 +167,13 @@ def load_policy(
         >>> run = swarm_mj.fly("random-walk", policy=policy, num_robots=20)
     """
     weights, config, feature_names = _read(path)
+    if isinstance(config, IndexConfig):
+        if is_deterministic:
+            raise ValueError(
+                f"policy {path} holds numbers of index-csma, which draw no recipient; leave out "
+                "--deterministic"
+            )
+        return IndexCsma(mission, from_tensors(weights))
     if isinstance(config, MlpConfig) and mission.num_robots != config.network.num_robots:
         size = config.network.num_robots
         raise ValueError(
@@ -207,14 +241,14 @@ def read_policy(path: Path) -> tuple["Network", GnnConfig]:
     """
     weights, config = read_weights(path)
     if not isinstance(config, GnnConfig):
-        raise ValueError(f"policy {path} is a plain network; name one that `swarm-mj train` made")
+        raise ValueError(f"policy {path} is no GNN; name one that `swarm-mj train` made")
     from swarm_mj.policies.gnn.own_networks import network_of
 
     _load_network(config, weights, None, path)
     return network_of(config.network, weights, config.own_network), config
 
 
-def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
+def read_weights(path: Path) -> tuple[Weights, StoredConfig]:
     """Return a policy's weights, each of them checked, and its config.
 
     Raises ValueError if there is no policy, or it is damaged, foreign, oversized or of a newer
@@ -224,7 +258,7 @@ def read_weights(path: Path) -> tuple[Weights, GnnConfig | MlpConfig]:
     return weights, config
 
 
-def _read(path: Path) -> tuple[Weights, GnnConfig | MlpConfig, tuple[str, ...]]:
+def _read(path: Path) -> tuple[Weights, StoredConfig, tuple[str, ...]]:
     """Return a policy's weights, its config and the names of its features."""
     place = find_policy(path)
     with _as_unsound(place):
@@ -234,7 +268,13 @@ def _read(path: Path) -> tuple[Weights, GnnConfig | MlpConfig, tuple[str, ...]]:
         document: dict[str, Any] = read_document(metadata[FORMAT], FORMAT, VERSION, dict)
         said = read_plain({"feature_names": (), **document}, _Metadata)
     # Before the config, whose number of features would say less.
-    feature_sets.check_unchanged(said.feature_set, said.feature_names, f"policy {place}")
+    if said.kind == "index":
+        if said.feature_names != FEATURES:
+            raise ValueError(
+                f"policy {place} was trained on other features than index-csma has now; train anew"
+            )
+    else:
+        feature_sets.check_unchanged(said.feature_set, said.feature_names, f"policy {place}")
     with _as_unsound(place):
         config = read_plain(said.config, CONFIGS[said.kind])
         _check_weights(config, weights)
@@ -276,12 +316,14 @@ def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
 
 
-def _check_weights(config: GnnConfig | MlpConfig, weights: Weights) -> None:
+def _check_weights(config: StoredConfig, weights: Weights) -> None:
     """Raise ValueError unless weights are a config's, as far as is known without running code."""
     if isinstance(config, GnnConfig) and config.own_network:
         # Their shapes only the code of its user knows.
         shapes = {name: tensor.shape for name, tensor in weights.items()}
         _check_tensors(shapes, weights)
+    elif isinstance(config, IndexConfig):
+        _check_tensors(config.tensors, weights)
     else:
         _check_tensors(config.network.tensors, weights)
 

@@ -29,6 +29,18 @@ class Packets(NamedTuple):
     receptions: Float[np.ndarray, "B"]  # times that a robot decoded a broadcast
 
 
+def arrived(
+    delivered: Float[np.ndarray, "B"], heard: Float[np.ndarray, "B"]
+) -> Float[np.ndarray, "B"]:
+    """Return how many packets came to whom they were for; broadcasts are for anyone in range.
+
+    Args:
+        delivered: Addressed packets that their recipient decoded; nan of broadcasts.
+        heard: Broadcasts that at least one robot decoded; nan of addressed packets.
+    """
+    return np.where(np.isnan(delivered), heard, delivered)
+
+
 class SlotCounts(NamedTuple):
     """Counts of the packets of one slot in one mission, before they have fates."""
 

@@ -8,7 +8,13 @@ from jaxtyping import Bool, Float32
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.about import Information, Leading, Listed, Look, PairMemory
-from swarm_mj.policies.carrier_sense import SENSING_MEMORY, TURN_EVERY, SensingPolicy, covered_share, turn_owners
+from swarm_mj.policies.carrier_sense import (
+    SENSING_MEMORY,
+    TURN_EVERY,
+    SensingPolicy,
+    covered_share,
+    in_turn,
+)
 from swarm_mj.policies.index.decisions import decide, empty_record
 from swarm_mj.policies.index.shipped import shipped_weights
 from swarm_mj.policies.index.table import MAX_ROWS, empty_gain, empty_table, note_and_weigh
@@ -21,7 +27,6 @@ from swarm_mj.radio.carrier_sensing import Contention, usual_busy_dbm
 
 # T before a slot, T in the packets of two slots and in the last own one, the number of a robot's
 # row, and the rows.
-LOST_AFTER = 3.0  # mean ages: who is older than that is not heard where it should be
 TABLE_BYTES = 8.0 + 2 * 4.0 + 4.0 + 1.0 + 4.0 * MAX_ROWS
 
 
@@ -40,10 +45,11 @@ class IndexCsma(SensingPolicy):
         rank=65,
         uses=(
             "its buffer, T in the packets that it sends and decodes, the power that it senses "
-            "before it transmits, the clock, the size of the team and the radio's range, by learned "
+            "before it transmits, the clock, its identity, the size of the team and the radio's range, by learned "
             "numbers"
         ),
         beyond=(
+            Information.COMMON_ORDER,
             Information.CLOCK,
             Information.TEAM_SIZE,
             Information.OBSERVED_POSITIONS,
@@ -135,16 +141,12 @@ class IndexCsma(SensingPolicy):
             minislot=share,
             shift_db=shift_db,
         )
-        minislot = np.floor(self._num_minislots * share)
-        minislot[share == 1.0] = self._num_minislots - 1.0
-        busy_dbm = self._busy_dbm + shift_db
         turn, place = divmod(slot, TURN_EVERY)
         if place == TURN_EVERY - 1:
-            is_owner = turn_owners(views.num_robots, turn)
-            minislot[_misses_any(views, is_owner)] = np.inf
-            minislot[:, is_owner] = 0.0
-            busy_dbm[:, is_owner] = np.inf
-        return Contention(minislot, busy_dbm)
+            return in_turn(views, turn)
+        minislot = np.floor(self._num_minislots * share)
+        minislot[share == 1.0] = self._num_minislots - 1.0
+        return Contention(minislot, self._busy_dbm + shift_db)
 
     def _follow_packets(self, views: LocalViews, recipient: np.ndarray) -> None:
         """Work out T in the packets of the last slot: each robot's own, and what it decoded.
@@ -161,13 +163,3 @@ class IndexCsma(SensingPolicy):
                 self._before, recipient, self._num_entries, self._last_sent
             )
         self._before[...] = views.buffers.timestamp
-
-
-def _misses_any(
-    views: LocalViews, is_wanted: Bool[np.ndarray, "N"]
-) -> Bool[np.ndarray, "B N"]:
-    """Return who lacks news of any of these robots: it never heard of one, or long ago."""
-    buffers = views.buffers
-    age = views.now[:, None, None] - buffers.timestamp
-    is_old = age[:, :, is_wanted] > LOST_AFTER * np.mean(age, axis=2)[:, :, None]
-    return np.any(is_old | ~buffers.is_known[:, :, is_wanted], axis=2)

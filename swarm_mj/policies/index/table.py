@@ -41,6 +41,8 @@ class Table(NamedTuple):
     trust: Float32[np.ndarray, "B N R"]  # share of the robot's packets that the neighbour decodes
     awaits: Bool[np.ndarray, "B N R"]  # whether it was not heard since the robot's last packet
     announced: Float32[np.ndarray, "B N N"]  # T in the robot's own last packet [windows]
+    own: Float32[np.ndarray, "N"]  # room for one robot's next T
+    ranges: Float[np.ndarray, "N"]  # room for how far away the others are
 
 
 class Gain(NamedTuple):
@@ -63,6 +65,8 @@ def empty_table(num_missions: int, num_robots: int) -> Table:
         trust=np.zeros((*robots, num_rows), dtype=np.float32),
         awaits=np.zeros((*robots, num_rows), dtype=np.bool_),
         announced=np.zeros((*robots, num_robots), dtype=np.float32),
+        own=np.zeros(num_robots, dtype=np.float32),
+        ranges=np.zeros(num_robots),
     )
 
 
@@ -112,7 +116,7 @@ def lacking(own: Float32[np.ndarray, "N"], bound: Float32[np.ndarray, "N"]) -> f
     return float(total)
 
 
-@compiled()
+@compiled(makes_arrays=False)
 def note_and_weigh(
     table: Table,
     gain: Gain,
@@ -144,8 +148,8 @@ def note_and_weigh(
         weights: The learned numbers of each mission.
     """
     num_missions, num_robots = heard.shape
-    own = np.empty(num_robots, dtype=np.float32)  # T of its next packet
-    ranges = np.empty(num_robots)  # how far away each robot is believed to be
+    own = table.own  # T of a robot's next packet
+    ranges = table.ranges  # how far away each robot is believed to be
     for b in range(num_missions):
         for i in range(num_robots):
             total = 0.0

@@ -4,11 +4,11 @@ A feature's weights are linear, so each can be read: the index of a robot whose 
 rises by the feature's weight, in octaves of news.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Float32
 
 NUM_SHIFTS = 6  # slots after which the usual shifts of the sensed power begin anew
 
@@ -109,6 +109,16 @@ def from_flat(numbers: Float[np.ndarray, "B D"]) -> Weights:
             bounded[:, FEATURES.index("team")] = 0.0
         parts.append(np.ascontiguousarray(bounded))
     return Weights(*parts)
+
+
+def as_tensors(weights: Weights) -> dict[str, Float32[np.ndarray, "..."]]:
+    """Return the first row as stored policies have it: arrays of single precision by their names."""
+    return {name: values[0].astype(np.float32) for name, values in weights._asdict().items()}
+
+
+def from_tensors(tensors: Mapping[str, np.ndarray]) -> Weights:
+    """Return what `as_tensors` was made of, to single precision."""
+    return Weights(*(tensors[name][None].astype(np.float64) for name in Weights._fields))
 
 
 def repeated(weights: Weights, num_missions: int) -> Weights:
