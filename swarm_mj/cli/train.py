@@ -172,7 +172,9 @@ def asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
     if options.device is not None and run.training.policy != "gnn":
-        raise ValueError(f"--device is of training a gnn, not of {run.training.policy}; leave it out")
+        raise ValueError(
+            f"--device is of training a gnn, not of {run.training.policy}; leave it out"
+        )
     device = options.device or run.device
     run = replace(run, limits=asked_limits(run.limits, options), device=device)
     names = (run_folder.SETTINGS, run_folder.CHECKPOINT, run_folder.CURVE, POLICY)

@@ -20,7 +20,6 @@ from swarm_mj.cli.mission_options import (
 )
 from swarm_mj.cli.options import Given, Option, flags_of
 from swarm_mj.learning.settings import (
-    INDEX_EVALUATED_EVERY,
     TURNLESS_SILENCE,
     PpoSettings,
     Training,
@@ -170,7 +169,7 @@ def check_of_index(given: Given) -> None:
     """Raise ValueError for an option that counts for networks only."""
     for place in given:
         owner, _, name = place.rpartition(".")
-        if not (owner in ("mission", "components") or name in OF_INDEX and not owner):
+        if not (owner in ("mission", "components") or (name in OF_INDEX and not owner)):
             flag = flags_of(SPECS[place])[0]
             raise ValueError(f"{flag} is of training a gnn, not of index-csma; leave it out")
 

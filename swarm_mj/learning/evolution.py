@@ -49,9 +49,7 @@ def begin(num_numbers: int, sigma: float) -> Search:
     )
 
 
-def ask(
-    search: Search, num_candidates: int, rng: np.random.Generator
-) -> Float[np.ndarray, "C D"]:
+def ask(search: Search, num_candidates: int, rng: np.random.Generator) -> Float[np.ndarray, "C D"]:
     """Return the candidates of the next generation."""
     steps = rng.standard_normal((num_candidates, len(search.mean)))
     return search.mean + search.sigma * np.sqrt(search.variance) * steps

@@ -48,6 +48,7 @@ def choose_entries(
     num_entries: int,
     last_sent: Float[np.ndarray, "B N N"],
 ) -> Float[np.ndarray, "B N N"]:
+    """Return the entries that robots send, as `entries_sent` does, and note them in `last_sent`."""
     num_missions, num_robots = recipient.shape
     sent = np.full_like(timestamp, ABSENT)
     for b in range(num_missions):

@@ -3,7 +3,7 @@
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from swarm_mj.policies.index.table import Gain
 from swarm_mj.policies.index.weights import Features, Weights

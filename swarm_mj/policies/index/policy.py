@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float32
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, uniform

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int8, Int16
 
-from swarm_mj.policies.index.weights import Weights
+from swarm_mj.policies.index.weights import MOST, Weights
 from swarm_mj.protocol.buffers import ABSENT
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.system.compiled import compiled
@@ -19,15 +19,12 @@ from swarm_mj.system.compiled import compiled
 MAX_ROWS = 32  # a robot's; of more neighbours, those without a row count as those with one
 NO_ROW = -1
 NOBODY = -1
-# A link's chance falls from 1 to 0 around this distance, by this logistic scale [ranges]. Links a
-# little beyond the range count: a neighbour moves, and its place is not of this moment.
-REACH = 1.1
+# A link's chance falls from 1 to 0 around the learned distance by this logistic scale, and so does
+# the chance that a neighbour decoded a packet that the robot did [ranges].
 REACH_SCALE = 0.067
-# Likewise the chance that a neighbour decoded a packet that the robot did.
-SHARED = 1.06
 SHARED_SCALE = 0.02
 LEAST_CHANCE = 0.02  # less counts as none
-TAKEN_WITHIN = REACH + 4.0 * REACH_SCALE  # who is this near is given a row [ranges]
+TAKEN_WITHIN = MOST["reach"] + 4.0 * REACH_SCALE  # who is this near is given a row [ranges]
 LEFT_BEYOND = 1.2 * TAKEN_WITHIN  # and loses it so far away, lest rows come and go at the edge
 KNOWS_ITSELF = np.float32(np.inf)  # in a neighbour's row, of the neighbour itself
 
@@ -38,8 +35,6 @@ class Table(NamedTuple):
     neighbour: Int16[np.ndarray, "B N R"]  # whose row it is, or NOBODY
     row: Int8[np.ndarray, "B N N"]  # which row a robot has, or NO_ROW
     bound: Float32[np.ndarray, "B N R N"]  # at least this is the neighbour's T [windows]
-    trust: Float32[np.ndarray, "B N R"]  # share of the robot's packets that the neighbour decodes
-    awaits: Bool[np.ndarray, "B N R"]  # whether it was not heard since the robot's last packet
     announced: Float32[np.ndarray, "B N N"]  # T in the robot's own last packet [windows]
     own: Float32[np.ndarray, "N"]  # room for one robot's next T
     ranges: Float[np.ndarray, "N"]  # room for how far away the others are
@@ -62,8 +57,6 @@ def empty_table(num_missions: int, num_robots: int) -> Table:
         neighbour=np.full((*robots, num_rows), NOBODY, dtype=np.int16),
         row=np.full((*robots, num_robots), NO_ROW, dtype=np.int8),
         bound=np.zeros((*robots, num_rows, num_robots), dtype=np.float32),
-        trust=np.zeros((*robots, num_rows), dtype=np.float32),
-        awaits=np.zeros((*robots, num_rows), dtype=np.bool_),
         announced=np.zeros((*robots, num_robots), dtype=np.float32),
         own=np.zeros(num_robots, dtype=np.float32),
         ranges=np.zeros(num_robots),
@@ -96,9 +89,7 @@ def raise_bound(
 
 
 @compiled(makes_arrays=False)
-def _take(
-    bound: Float32[np.ndarray, "N"], packet: Float32[np.ndarray, "N"], sender: int
-) -> None:
+def _take(bound: Float32[np.ndarray, "N"], packet: Float32[np.ndarray, "N"], sender: int) -> None:
     """Note what a sender's own packet says of its T, where the packet has an entry."""
     # Also where that is less: what the robot sent it, and took for decoded, was not.
     for k in range(len(bound)):
@@ -158,19 +149,16 @@ def note_and_weigh(
                 total += timestamp[b, i, k]
             mean_age = now[b] - total / num_robots
             own[i] = now[b] + SLOT_WINDOWS
-            reach, num_unknown, edge = _look_around(
-                position_m[b, i], is_known[b, i], i, range_m, ranges
+            neighbours, num_unknown, edge = _look_around(
+                position_m[b, i], is_known[b, i], i, range_m, weights.reach[b, 0], ranges
             )
             _assign_rows(
                 table.neighbour[b, i],
                 table.row[b, i],
                 table.bound[b, i],
-                table.trust[b, i],
-                table.awaits[b, i],
                 ranges,
                 own,
                 mean_age,
-                weights.success[b, 0],
             )
             sender = heard[b, i]
             is_late = False
@@ -188,22 +176,17 @@ def note_and_weigh(
                 if j == NOBODY:
                     continue
                 bound = table.bound[b, i, r]
-                link = chance(ranges[j], REACH, REACH_SCALE)
+                link = chance(ranges[j], weights.reach[b, 0], REACH_SCALE)
                 if sender != i:
                     said = earlier[b, sender] if is_late else packet[b, sender]
                     if j == sender:
-                        if table.awaits[b, i, r]:
-                            table.awaits[b, i, r] = False
-                            has_come = 1.0 if said[i] >= table.announced[b, i, i] else 0.0
-                            change = has_come - table.trust[b, i, r]
-                            table.trust[b, i, r] += weights.believed[b, 0] * change
                         _take(bound, said, j)
                     else:
                         apart_m = np.hypot(
                             position_m[b, i, j, 0] - position_m[b, i, sender, 0],
                             position_m[b, i, j, 1] - position_m[b, i, sender, 1],
                         )
-                        share = chance(apart_m / range_m, SHARED, SHARED_SCALE)
+                        share = chance(apart_m / range_m, weights.shared[b, 0], SHARED_SCALE)
                         if share > LEAST_CHANCE:
                             raise_bound(bound, said, np.float32(share))
                 if link <= LEAST_CHANCE:
@@ -211,16 +194,13 @@ def note_and_weigh(
                 if has_sent[b, i]:
                     # The same for all in reach: with a link's chance, those at the edge of it would
                     # never be satisfied.
-                    if table.awaits[b, i, r]:
-                        table.trust[b, i, r] *= 1.0 - weights.doubted[b, 0]
-                    table.awaits[b, i, r] = True
-                    raise_bound(bound, packet[b, i], table.trust[b, i, r])
-                part = link * table.trust[b, i, r] * lacking(own, bound)
+                    raise_bound(bound, packet[b, i], np.float32(weights.success[b, 0]))
+                part = link * lacking(own, bound)
                 brought += part
                 largest = max(largest, part)
                 counted += link
             if counted > 0.0:  # those without a row count as those with one
-                brought *= max(1.0, reach / counted)
+                brought *= max(1.0, neighbours / counted)
             if num_unknown > 0:
                 # Without what was announced, robots that know of one they never heard would
                 # transmit for ever.
@@ -228,7 +208,7 @@ def note_and_weigh(
                 brought += weights.stranger[b, 0] * num_unknown / num_robots * unheard
             gain.total[b, i] = brought
             gain.largest[b, i] = largest
-            gain.neighbours[b, i] = max(reach, counted)
+            gain.neighbours[b, i] = max(neighbours, counted)
             gain.edge[b, i] = edge
 
 
@@ -238,6 +218,7 @@ def _look_around(
     is_known: Bool[np.ndarray, "N"],
     i: int,
     range_m: float,
+    reach: float,
     ranges: Float[np.ndarray, "N"],
 ) -> tuple[float, int, float]:
     """Fill in how far away each robot is believed to be, infinitely if unknown.
@@ -246,7 +227,7 @@ def _look_around(
         The neighbours' number, by the chances of links; of how many nothing is known; and how far
         the middle of all known robots is, over their mean distance.
     """
-    reach = 0.0
+    neighbours = 0.0
     num_unknown = 0
     num_known = 0
     sum_x = 0.0
@@ -267,11 +248,11 @@ def _look_around(
         sum_y += y
         sum_ranges += ranges[j]
         if ranges[j] < TAKEN_WITHIN:
-            reach += chance(ranges[j], REACH, REACH_SCALE)
+            neighbours += chance(ranges[j], reach, REACH_SCALE)
     edge = 0.5
     if sum_ranges > 0.0:
         edge = np.sqrt(sum_x * sum_x + sum_y * sum_y) / sum_ranges
-    return reach, num_unknown, edge
+    return neighbours, num_unknown, edge
 
 
 @compiled(makes_arrays=False)
@@ -279,12 +260,9 @@ def _assign_rows(
     neighbour: Int16[np.ndarray, "R"],
     row: Int8[np.ndarray, "N"],
     bound: Float32[np.ndarray, "R N"],
-    trust: Float32[np.ndarray, "R"],
-    awaits: Bool[np.ndarray, "R"],
     ranges: Float[np.ndarray, "N"],
     own: Float32[np.ndarray, "N"],
     mean_age: float,
-    success: float,
 ) -> None:
     """Take rows from those who left, and give free ones to the nearest who have none."""
     num_robots = len(ranges)
@@ -309,8 +287,6 @@ def _assign_rows(
                 nearest = j
         neighbour[r] = nearest
         row[nearest] = r
-        trust[r] = success
-        awaits[r] = False
         num_waiting -= 1
         # Of a newcomer nothing is noted. That it knows nothing would be a bound, but late in a
         # mission the robot would then transmit as if the team had just begun: it is taken to be

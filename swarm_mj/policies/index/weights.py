@@ -1,4 +1,4 @@
-"""The numbers of `index-csma` that are learned: by name, and in a row for the search that finds them.
+"""The learned numbers of `index-csma`: by name, and in a row for the search that finds them.
 
 A feature's weights are linear, so each can be read: the index of a robot whose feature rises by one
 rises by the feature's weight, in octaves of news.
@@ -39,9 +39,11 @@ class Weights(NamedTuple):
     side.
     """
 
-    success: Float[np.ndarray, "B 1"]  # trust in a neighbour of whom nothing is noted yet
-    believed: Float[np.ndarray, "B 1"]  # by which trust moves when an answer comes
-    doubted: Float[np.ndarray, "B 1"]  # by which it falls when none comes
+    # What a packet that it sent brought to each neighbour in reach: this share of what it held.
+    success: Float[np.ndarray, "B 1"]
+    reach: Float[np.ndarray, "B 1"]  # distance at which every second link is one [ranges]
+    # Distance from a sender that the robot decoded at which every second neighbour did, too.
+    shared: Float[np.ndarray, "B 1"]  # [ranges]
     stranger: Float[np.ndarray, "B 1"]  # weight of the gain of robots never heard of
     first: Float[np.ndarray, "B 1"]  # index from which a robot begins in the first minislot
     octaves: Float[np.ndarray, "B 1"]  # of the index, between the first minislot and the last
@@ -54,27 +56,27 @@ class Weights(NamedTuple):
     sensing_db: Float[np.ndarray, "B F"]  # in the power that it takes for a busy channel [dB]
 
 
-# Where a search begins: what a shorter one had come to, rounded, with no feature for sensing.
+# Where a search begins: what a shorter one had come to, rounded.
 START = Weights(
-    success=np.array([[0.75]]),
-    believed=np.array([[0.3]]),
-    doubted=np.array([[0.1]]),
-    stranger=np.array([[3.0]]),
-    first=np.array([[3.0]]),
-    octaves=np.array([[8.0]]),
+    success=np.array([[0.7]]),
+    reach=np.array([[1.08]]),
+    shared=np.array([[1.05]]),
+    stranger=np.array([[3.4]]),
+    first=np.array([[2.7]]),
+    octaves=np.array([[8.4]]),
     drawn=np.array([[0.06]]),
-    threshold=np.array([[-1.0]]),
-    softness=np.array([[0.1]]),
-    shift_db=np.array([[4.0, 2.0, 1.0, 0.0, 0.0, 0.0]]),
-    index=np.array([[0.3, 0.2, 0.4, -0.6, 0.4, 0.3, 0.9, 0.0, -0.7, 0.1]]),
-    silence=np.zeros((1, NUM_FEATURES)),
-    sensing_db=np.zeros((1, NUM_FEATURES)),
+    threshold=np.array([[-1.2]]),
+    softness=np.array([[0.3]]),
+    shift_db=np.array([[2.0, 1.5, 0.0, 0.0, 0.5, 0.5]]),
+    index=np.array([[0.3, 0.35, 0.2, -0.7, 0.6, 0.3, 0.7, 0.0, -0.7, 0.1]]),
+    silence=np.array([[-0.1, -0.1, 0.4, -0.1, 0.0, 0.2, 0.0, 0.0, 0.1, 0.4]]),
+    sensing_db=np.array([[0.1, 0.4, 0.9, -0.9, 0.2, -0.5, 0.0, -0.8, -0.3, -0.2]]),
 )
 # The size of a step that is worth a try, number by number.
 STEPS = Weights(
     success=np.array([[0.1]]),
-    believed=np.array([[0.1]]),
-    doubted=np.array([[0.05]]),
+    reach=np.array([[0.05]]),
+    shared=np.array([[0.07]]),
     stranger=np.array([[1.0]]),
     first=np.array([[0.7]]),
     octaves=np.array([[1.0]]),
@@ -87,8 +89,16 @@ STEPS = Weights(
     sensing_db=np.full((1, NUM_FEATURES), 0.7),
 )
 # What numbers may be; all others are free.
-LEAST = {"success": 0.3, "believed": 0.0, "doubted": 0.0, "stranger": 0.5, "octaves": 2.0, "drawn": 0.0, "softness": 0.0}
-MOST = {"success": 1.0, "believed": 1.0, "doubted": 0.5, "octaves": 24.0, "drawn": 1.0}
+LEAST = {
+    "success": 0.3,
+    "reach": 0.6,
+    "shared": 0.5,
+    "stranger": 0.5,
+    "octaves": 2.0,
+    "drawn": 0.0,
+    "softness": 0.0,
+}
+MOST = {"success": 1.0, "reach": 1.1, "shared": 1.4, "octaves": 24.0, "drawn": 1.0}
 NUMBERS = sum(values.shape[1] for values in START)
 
 
@@ -112,7 +122,7 @@ def from_flat(numbers: Float[np.ndarray, "B D"]) -> Weights:
 
 
 def as_tensors(weights: Weights) -> dict[str, Float32[np.ndarray, "..."]]:
-    """Return the first row as stored policies have it: arrays of single precision by their names."""
+    """Return the first row as policies are stored: arrays of single precision by their names."""
     return {name: values[0].astype(np.float32) for name, values in weights._asdict().items()}
 
 
