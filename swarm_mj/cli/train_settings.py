@@ -56,7 +56,7 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
 
 
 INDEX = "index-csma"
-# What counts for the search of an index, beside missions and parts: credit, networks and PPO do not.
+# What counts for the search of an index, beside missions and parts; credit and networks do not.
 OF_INDEX = ("policy", "robots", "missions", "train_windows", "seed", "evaluate_every", "held_out")
 
 

@@ -116,7 +116,7 @@ class EvolutionSettings:
 
     Args:
         candidates: Policies of a generation, which fly the same missions.
-        first_step: The size of its first steps, in the steps that `index.weights` calls worth a try.
+        first_step: The size of its first steps, over those that `index.weights` calls worth a try.
 
     Raises:
         ValueError: A value is not of its kind, or out of its range.
@@ -205,8 +205,8 @@ class Training:
 
     policy: TrainedPolicy = common_setting(
         "gnn",
-        "what is trained: gnn, the network of --features and --network by PPO, or index-csma, whose "
-        "numbers are found by evolution",
+        "what is trained: gnn, a network, by PPO; or index-csma, whose numbers are found by "
+        "evolution",
         choices=get_args(TrainedPolicy),
     )
     credit_assignment: CreditAssignment = common_setting(

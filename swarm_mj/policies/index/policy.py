@@ -44,8 +44,8 @@ class IndexCsma(SensingPolicy):
         rank=65,
         uses=(
             "its buffer, T in the packets that it sends and decodes, the power that it senses "
-            "before it transmits, the clock, its identity, the size of the team and the radio's range, by learned "
-            "numbers"
+            "before it transmits, the clock, its identity, the size of the team and the radio's "
+            "range, by learned numbers"
         ),
         beyond=(
             Information.COMMON_ORDER,

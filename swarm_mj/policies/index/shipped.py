@@ -1,4 +1,4 @@
-"""The numbers of `index-csma` that come with the package, and how they were made: `shipped.toml`."""
+"""The numbers of `index-csma` that come with the package, in `shipped.toml`."""
 
 import tomllib
 from functools import cache

@@ -19,6 +19,7 @@ from swarm_mj.system.compiled import compiled
 MAX_ROWS = 32  # a robot's; of more neighbours, those without a row count as those with one
 NO_ROW = -1
 NOBODY = -1
+MIDDLE = 0.5  # of `Around.edge`, of a robot that knows nobody
 # A link's chance falls from 1 to 0 around the learned distance by this logistic scale, and so does
 # the chance that a neighbour decoded a packet that the robot did [ranges].
 REACH_SCALE = 0.067
@@ -38,6 +39,14 @@ class Table(NamedTuple):
     announced: Float32[np.ndarray, "B N N"]  # T in the robot's own last packet [windows]
     own: Float32[np.ndarray, "N"]  # room for one robot's next T
     ranges: Float[np.ndarray, "N"]  # room for how far away the others are
+
+
+class Around(NamedTuple):
+    """A robot's neighbourhood, as it believes."""
+
+    neighbours: float  # their number, by the chances of their links
+    num_unknown: int  # robots of whom it knows nothing
+    edge: float  # how far the middle of those it knows is, over their mean distance
 
 
 class Gain(NamedTuple):
@@ -89,9 +98,11 @@ def raise_bound(
 
 
 @compiled(makes_arrays=False)
-def _take(bound: Float32[np.ndarray, "N"], packet: Float32[np.ndarray, "N"], sender: int) -> None:
-    """Note what a sender's own packet says of its T, where the packet has an entry."""
-    # Also where that is less: what the robot sent it, and took for decoded, was not.
+def _copy_entries(
+    packet: Float32[np.ndarray, "N"], sender: int, bound: Float32[np.ndarray, "N"]
+) -> None:
+    """Take T of its sender's packet for what the sender knows, where the packet has an entry."""
+    # Also where that is less: what the robot sent it, and took for decoded, it has not decoded.
     for k in range(len(bound)):
         if packet[k] != ABSENT:
             bound[k] = packet[k]
@@ -147,69 +158,105 @@ def note_and_weigh(
             for k in range(num_robots):
                 own[k] = timestamp[b, i, k]
                 total += timestamp[b, i, k]
-            mean_age = now[b] - total / num_robots
             own[i] = now[b] + SLOT_WINDOWS
-            neighbours, num_unknown, edge = _look_around(
+            around = _look_around(
                 position_m[b, i], is_known[b, i], i, range_m, weights.reach[b, 0], ranges
             )
-            _assign_rows(
-                table.neighbour[b, i],
-                table.row[b, i],
-                table.bound[b, i],
-                ranges,
-                own,
-                mean_age,
+            _leave_rows(table.neighbour[b, i], table.row[b, i], ranges)
+            mean_age = now[b] - total / num_robots
+            _take_rows(
+                table.neighbour[b, i], table.row[b, i], table.bound[b, i], ranges, own, mean_age
             )
             sender = heard[b, i]
-            is_late = False
             if sender != i:
                 # The sender's own entry says when it sent.
                 is_late = timestamp[b, i, sender] < packet[b, sender, sender]
+                said = earlier[b, sender] if is_late else packet[b, sender]
+                _note_decoded(
+                    table, b, i, sender, said, position_m[b, i], range_m, weights.shared[b, 0]
+                )
             if has_sent[b, i]:
-                for k in range(num_robots):
-                    table.announced[b, i, k] = max(table.announced[b, i, k], packet[b, i, k])
-            counted = 0.0
-            brought = 0.0
-            largest = 0.0
-            for r in range(table.neighbour.shape[2]):
-                j = table.neighbour[b, i, r]
-                if j == NOBODY:
-                    continue
-                bound = table.bound[b, i, r]
-                link = chance(ranges[j], weights.reach[b, 0], REACH_SCALE)
-                if sender != i:
-                    said = earlier[b, sender] if is_late else packet[b, sender]
-                    if j == sender:
-                        _take(bound, said, j)
-                    else:
-                        apart_m = np.hypot(
-                            position_m[b, i, j, 0] - position_m[b, i, sender, 0],
-                            position_m[b, i, j, 1] - position_m[b, i, sender, 1],
-                        )
-                        share = chance(apart_m / range_m, weights.shared[b, 0], SHARED_SCALE)
-                        if share > LEAST_CHANCE:
-                            raise_bound(bound, said, np.float32(share))
-                if link <= LEAST_CHANCE:
-                    continue
-                if has_sent[b, i]:
-                    # The same for all in reach: with a link's chance, those at the edge of it would
-                    # never be satisfied.
-                    raise_bound(bound, packet[b, i], np.float32(weights.success[b, 0]))
-                part = link * lacking(own, bound)
-                brought += part
-                largest = max(largest, part)
-                counted += link
-            if counted > 0.0:  # those without a row count as those with one
-                brought *= max(1.0, neighbours / counted)
-            if num_unknown > 0:
-                # Without what was announced, robots that know of one they never heard would
-                # transmit for ever.
-                unheard = SLOT_WINDOWS + lacking(own, table.announced[b, i])
-                brought += weights.stranger[b, 0] * num_unknown / num_robots * unheard
-            gain.total[b, i] = brought
-            gain.largest[b, i] = largest
-            gain.neighbours[b, i] = max(neighbours, counted)
-            gain.edge[b, i] = edge
+                _note_sent(table, b, i, packet[b, i], ranges, weights)
+            _weigh(table, gain, b, i, around, weights)
+
+
+@compiled(makes_arrays=False)
+def _note_decoded(
+    table: Table,
+    b: int,
+    i: int,
+    sender: int,
+    said: Float32[np.ndarray, "N"],
+    position_m: Float[np.ndarray, "N 2"],
+    range_m: float,
+    shared: float,
+) -> None:
+    """Note T of a packet that a robot decoded, and that its neighbours near the sender did, too."""
+    for r in range(table.neighbour.shape[2]):
+        j = table.neighbour[b, i, r]
+        if j == NOBODY:
+            continue
+        if j == sender:
+            _copy_entries(said, j, table.bound[b, i, r])
+            continue
+        apart_m = np.hypot(
+            position_m[j, 0] - position_m[sender, 0], position_m[j, 1] - position_m[sender, 1]
+        )
+        share = chance(apart_m / range_m, shared, SHARED_SCALE)
+        if share > LEAST_CHANCE:
+            raise_bound(table.bound[b, i, r], said, np.float32(share))
+
+
+@compiled(makes_arrays=False)
+def _note_sent(
+    table: Table,
+    b: int,
+    i: int,
+    said: Float32[np.ndarray, "N"],
+    ranges: Float[np.ndarray, "N"],
+    weights: Weights,
+) -> None:
+    """Note T of a packet that a robot sent, and that its neighbours may have decoded."""
+    for k in range(len(said)):
+        table.announced[b, i, k] = max(table.announced[b, i, k], said[k])
+    for r in range(table.neighbour.shape[2]):
+        j = table.neighbour[b, i, r]
+        if j == NOBODY:
+            continue
+        if chance(ranges[j], weights.reach[b, 0], REACH_SCALE) > LEAST_CHANCE:
+            # The same for all in reach: with a link's chance, robots would transmit for ever to
+            # those at the edge of it.
+            raise_bound(table.bound[b, i, r], said, np.float32(weights.success[b, 0]))
+
+
+@compiled(makes_arrays=False)
+def _weigh(table: Table, gain: Gain, b: int, i: int, around: Around, weights: Weights) -> None:
+    """Say what a robot's next packet, whose T is in `Table.own`, would bring."""
+    num_robots = len(table.own)
+    counted = 0.0
+    brought = 0.0
+    largest = 0.0
+    for r in range(table.neighbour.shape[2]):
+        j = table.neighbour[b, i, r]
+        if j == NOBODY:
+            continue
+        link = chance(table.ranges[j], weights.reach[b, 0], REACH_SCALE)
+        if link > LEAST_CHANCE:
+            part = link * lacking(table.own, table.bound[b, i, r])
+            brought += part
+            largest = max(largest, part)
+            counted += link
+    if counted > 0.0:  # those without a row count as those with one
+        brought *= max(1.0, around.neighbours / counted)
+    if around.num_unknown > 0:
+        # Without what was announced, robots that know of one they never heard of would transmit
+        # for ever.
+        unheard = SLOT_WINDOWS + lacking(table.own, table.announced[b, i])
+        brought += weights.stranger[b, 0] * around.num_unknown / num_robots * unheard
+    gain.total[b, i] = brought
+    gain.largest[b, i] = largest
+    gain.neighbours[b, i] = max(around.neighbours, counted)
+    gain.edge[b, i] = around.edge
 
 
 @compiled(makes_arrays=False)
@@ -220,16 +267,10 @@ def _look_around(
     range_m: float,
     reach: float,
     ranges: Float[np.ndarray, "N"],
-) -> tuple[float, int, float]:
-    """Fill in how far away each robot is believed to be, infinitely if unknown.
-
-    Returns:
-        The neighbours' number, by the chances of links; of how many nothing is known; and how far
-        the middle of all known robots is, over their mean distance.
-    """
+) -> Around:
+    """Fill in how far away each robot is believed to be, and return what is around one of them."""
     neighbours = 0.0
     num_unknown = 0
-    num_known = 0
     sum_x = 0.0
     sum_y = 0.0
     sum_ranges = 0.0
@@ -243,20 +284,31 @@ def _look_around(
         x = (position_m[j, 0] - position_m[i, 0]) / range_m
         y = (position_m[j, 1] - position_m[i, 1]) / range_m
         ranges[j] = np.sqrt(x * x + y * y)
-        num_known += 1
         sum_x += x
         sum_y += y
         sum_ranges += ranges[j]
         if ranges[j] < TAKEN_WITHIN:
             neighbours += chance(ranges[j], reach, REACH_SCALE)
-    edge = 0.5
+    edge = MIDDLE
     if sum_ranges > 0.0:
         edge = np.sqrt(sum_x * sum_x + sum_y * sum_y) / sum_ranges
-    return neighbours, num_unknown, edge
+    return Around(neighbours=neighbours, num_unknown=num_unknown, edge=edge)
 
 
 @compiled(makes_arrays=False)
-def _assign_rows(
+def _leave_rows(
+    neighbour: Int16[np.ndarray, "R"], row: Int8[np.ndarray, "N"], ranges: Float[np.ndarray, "N"]
+) -> None:
+    """Take their rows from those who are too far away by now."""
+    for r in range(len(neighbour)):
+        j = neighbour[r]
+        if j != NOBODY and ranges[j] > LEFT_BEYOND:
+            row[j] = NO_ROW
+            neighbour[r] = NOBODY
+
+
+@compiled(makes_arrays=False)
+def _take_rows(
     neighbour: Int16[np.ndarray, "R"],
     row: Int8[np.ndarray, "N"],
     bound: Float32[np.ndarray, "R N"],
@@ -264,33 +316,29 @@ def _assign_rows(
     own: Float32[np.ndarray, "N"],
     mean_age: float,
 ) -> None:
-    """Take rows from those who left, and give free ones to the nearest who have none."""
-    num_robots = len(ranges)
+    """Give free rows to those near who have none, the nearest first."""
     for r in range(len(neighbour)):
-        j = neighbour[r]
-        if j != NOBODY and ranges[j] > LEFT_BEYOND:
-            row[j] = NO_ROW
-            neighbour[r] = NOBODY
-    num_waiting = 0
-    for j in range(num_robots):
-        if ranges[j] < TAKEN_WITHIN and row[j] == NO_ROW:
-            num_waiting += 1
-    for r in range(len(neighbour)):
-        if num_waiting == 0:
-            return
         if neighbour[r] != NOBODY:
             continue
-        nearest = NOBODY
-        for j in range(num_robots):
-            is_free = ranges[j] < TAKEN_WITHIN and row[j] == NO_ROW
-            if is_free and (nearest == NOBODY or ranges[j] < ranges[nearest]):
-                nearest = j
-        neighbour[r] = nearest
-        row[nearest] = r
-        num_waiting -= 1
+        j = _nearest_without(row, ranges)
+        if j == NOBODY:
+            return
+        neighbour[r] = j
+        row[j] = r
         # Of a newcomer nothing is noted. That it knows nothing would be a bound, but late in a
         # mission the robot would then transmit as if the team had just begun: it is taken to be
         # behind the robot by the mean age.
-        for k in range(num_robots):
+        for k in range(len(own)):
             bound[r, k] = max(np.float32(0.0), own[k] - np.float32(mean_age))
-        bound[r, nearest] = KNOWS_ITSELF
+        bound[r, j] = KNOWS_ITSELF
+
+
+@compiled(makes_arrays=False)
+def _nearest_without(row: Int8[np.ndarray, "N"], ranges: Float[np.ndarray, "N"]) -> int:
+    """Return the nearest robot that may have a row and has none, or NOBODY."""
+    nearest = NOBODY
+    for j in range(len(ranges)):
+        may_have = row[j] == NO_ROW and ranges[j] < TAKEN_WITHIN
+        if may_have and (nearest == NOBODY or ranges[j] < ranges[nearest]):
+            nearest = j
+    return nearest
