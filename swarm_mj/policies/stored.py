@@ -241,7 +241,8 @@ def read_policy(path: Path) -> tuple["Network", GnnConfig]:
     """
     weights, config = read_weights(path)
     if not isinstance(config, GnnConfig):
-        raise ValueError(f"policy {path} is no GNN; name one that `swarm-mj train` made")
+        kind = "a plain network" if isinstance(config, MlpConfig) else "an index"
+        raise ValueError(f"policy {path} is {kind}; name one that `swarm-mj train` made")
     from swarm_mj.policies.gnn.own_networks import network_of
 
     _load_network(config, weights, None, path)

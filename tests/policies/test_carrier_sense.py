@@ -99,7 +99,7 @@ def test_robots_hold_back_from_the_missions_power(name):
         assert radio.busy_dbm.tolist() == [[busy_dbm] * 3]
 
 
-@pytest.mark.parametrize("name", ["csma", "age-gain-csma"])
+@pytest.mark.parametrize("name", ["csma", "age-gain-csma", "index-csma"])
 def test_a_policy_learns_of_the_truth_who_transmits_and_nothing_else(name):
     """Its robots transmit if the radio says so, and it is handed no true links."""
 
@@ -154,7 +154,7 @@ def test_a_policy_of_ones_own_may_sense():
 def test_minislots_take_their_time_from_packets(minislot_us, entries):
     """A slot of 367 bytes; 64 of 20 µs take 9.4 bytes of it, and leave 357: 7 and 38 times 9."""
     mission = paper(bit_rate=367 * 160.0, minislot_us=minislot_us)
-    for name in ("csma", "age-gain-csma"):
+    for name in ("csma", "age-gain-csma", "index-csma"):
         assert make_policy(name, mission).packet(mission).num_entries == entries
     assert make_policy("tdma", mission).packet(mission).num_entries == 40
     short = paper(bit_rate=16 * 160.0, minislot_us=minislot_us)
@@ -327,7 +327,8 @@ def test_robots_that_let_news_go_first_are_younger_than_those_that_draw(task):
 
 
 @pytest.mark.parametrize(
-    ("name", "robots"), [("csma", 3), ("age-gain-csma", 3), ("csma", 8), ("age-gain-csma", 20)]
+    ("name", "robots"),
+    [("csma", 3), ("age-gain-csma", 3), ("index-csma", 3), ("csma", 8), ("age-gain-csma", 20)],
 )
 def test_teams_among_blocks_come_to_know_everyone(name, robots):
     """Robots that no wall lets sense each other must not transmit in every slot."""

@@ -19,12 +19,12 @@ from swarm_mj.simulation.swarm import Swarm
 MISSION = paper("flocking", num_robots=8)
 CENTRALISED = ["round-robin", "mst", "greedy-oracle"]
 DECENTRALISED = [name for name in POLICIES if name not in CENTRALISED]
-SENSING = ["csma", "age-gain-csma"]  # robots of these also know what they sense
+SENSING = ["csma", "age-gain-csma", "index-csma"]  # robots of these also know what they sense
 # What robots learn from payload, or from others' T in packets, is in no view: the tests of these
 # policies hold them to Eq. 9.
 # What packets carry beyond T, M and P.
 PAYLOAD = {name: about.payload_name for name, about in LISTED.items() if about.payload is not None}
-VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma")]
+VIEWED = [name for name in DECENTRALISED if name not in (*PAYLOAD, "sotdma", "index-csma")]
 ROW = 3  # the robot whose knowledge the law keeps
 
 

@@ -7,6 +7,7 @@ from swarm_mj.mission import paper, reference
 from swarm_mj.policies.carrier_sense import AgeGainCsma, CarrierSense
 from swarm_mj.policies.centralised import MinimumSpanningTree, RoundRobin
 from swarm_mj.policies.greedy_oracle import GreedyOracle
+from swarm_mj.policies.index.policy import IndexCsma
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
@@ -108,6 +109,7 @@ KINDS = {
     "aloha": Aloha,
     "csma": CarrierSense,
     "age-gain-csma": AgeGainCsma,
+    "index-csma": IndexCsma,
     "gossip": InnovationGossip,
     "tdma": Tdma,
     "spatial-tdma": SpatialTdma,

@@ -25,7 +25,16 @@ MISSIONS = {
     "noise at rest": paper("stationary", position_noise_m=20.0, **SIZE),
     "several decode": paper("random-walk", sinr_threshold_db=-6.0, **SIZE),
 }
-POLICIES = ("random-flooding", "round-robin", "mst", "tdma", "csma", "age-gain-csma", "planner")
+POLICIES = (
+    "random-flooding",
+    "round-robin",
+    "mst",
+    "tdma",
+    "csma",
+    "age-gain-csma",
+    "index-csma",
+    "planner",
+)
 
 
 class OtherRadio(FreeSpaceRadio):

@@ -1,5 +1,6 @@
 """`index-csma`: robots that listen before they transmit, in the order of a learned index."""
 
+import hashlib
 from collections.abc import Sequence
 
 import numpy as np
@@ -17,7 +18,9 @@ from swarm_mj.policies.carrier_sense import (
 from swarm_mj.policies.index.decisions import decide, empty_record
 from swarm_mj.policies.index.shipped import shipped_weights
 from swarm_mj.policies.index.table import MAX_ROWS, empty_gain, empty_table, note_and_weigh
-from swarm_mj.policies.index.weights import NUM_SHIFTS, Weights, repeated
+from swarm_mj.policies.index.weights import NUM_SHIFTS, Weights, flat, repeated
+from swarm_mj.policies.learned import DIGITS
+from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.partial_buffers import choose_entries
@@ -80,6 +83,12 @@ class IndexCsma(SensingPolicy):
         self._num_minislots = mission.minislots
         self._busy_dbm = usual_busy_dbm(mission)
         self._num_entries = self.packet(mission).num_entries
+
+    @property
+    def parameters(self) -> Parameters:
+        """A digest that changes with the numbers."""
+        numbers = flat(self._weights).tobytes()
+        return {"digest": hashlib.sha256(numbers).hexdigest()[:DIGITS]}
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Forget all packets and neighbours; arguments as in `Policy.start`."""
