@@ -91,9 +91,9 @@ def decide(
             silence = 0.0
             sensing_db = 0.0
             for f in range(len(features)):
-                index += weights.index[b, f] * features[f]
-                silence += weights.silence[b, f] * features[f]
-                sensing_db += weights.sensing_db[b, f] * features[f]
+                index += weights.in_index[b, f] * features[f]
+                silence += weights.in_silence[b, f] * features[f]
+                sensing_db += weights.in_sensing_db[b, f] * features[f]
 
             share = (first - index) / octaves + weights.drawn[b, 0] * drawn[b, 0, i]
             minislot[b, i] = min(max(share, 0.0), 1.0)

@@ -223,7 +223,7 @@ def _note_sent(
         j = table.neighbour[b, i, r]
         if j == NOBODY:
             continue
-        if chance(ranges[j], weights.reach[b, 0], REACH_SCALE) > LEAST_CHANCE:
+        if chance(float(ranges[j]), weights.reach[b, 0], REACH_SCALE) > LEAST_CHANCE:
             # The same for all in reach: with a link's chance, robots would transmit for ever to
             # those at the edge of it.
             raise_bound(table.bound[b, i, r], said, np.float32(weights.success[b, 0]))
@@ -240,7 +240,7 @@ def _weigh(table: Table, gain: Gain, b: int, i: int, around: Around, weights: We
         j = table.neighbour[b, i, r]
         if j == NOBODY:
             continue
-        link = chance(table.ranges[j], weights.reach[b, 0], REACH_SCALE)
+        link = chance(float(table.ranges[j]), weights.reach[b, 0], REACH_SCALE)
         if link > LEAST_CHANCE:
             part = link * lacking(table.own, table.bound[b, i, r])
             brought += part

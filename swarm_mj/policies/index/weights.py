@@ -51,9 +51,9 @@ class Weights(NamedTuple):
     threshold: Float[np.ndarray, "B 1"]  # octaves of gain below which a robot is silent
     softness: Float[np.ndarray, "B 1"]  # of that, the scale of a logistic draw [octaves]
     shift_db: Float[np.ndarray, "B S"]  # by which a channel may be louder, slot by slot [dB]
-    index: Float[np.ndarray, "B F"]  # of features in the index [octaves]
-    silence: Float[np.ndarray, "B F"]  # in the gain that counts for silence [octaves]
-    sensing_db: Float[np.ndarray, "B F"]  # in the power that it takes for a busy channel [dB]
+    in_index: Float[np.ndarray, "B F"]  # of features in the index [octaves]
+    in_silence: Float[np.ndarray, "B F"]  # in the gain that counts for silence [octaves]
+    in_sensing_db: Float[np.ndarray, "B F"]  # in the power that it takes for a busy channel [dB]
 
 
 # Where a search begins: what a shorter one had come to, rounded.
@@ -68,9 +68,9 @@ START = Weights(
     threshold=np.array([[-1.2]]),
     softness=np.array([[0.3]]),
     shift_db=np.array([[2.0, 1.5, 0.0, 0.0, 0.5, 0.5]]),
-    index=np.array([[0.3, 0.35, 0.2, -0.7, 0.6, 0.3, 0.7, 0.0, -0.7, 0.1]]),
-    silence=np.array([[-0.1, -0.1, 0.4, -0.1, 0.0, 0.2, 0.0, 0.0, 0.1, 0.4]]),
-    sensing_db=np.array([[0.1, 0.4, 0.9, -0.9, 0.2, -0.5, 0.0, -0.8, -0.3, -0.2]]),
+    in_index=np.array([[0.3, 0.35, 0.2, -0.7, 0.6, 0.3, 0.7, 0.0, -0.7, 0.1]]),
+    in_silence=np.array([[-0.1, -0.1, 0.4, -0.1, 0.0, 0.2, 0.0, 0.0, 0.1, 0.4]]),
+    in_sensing_db=np.array([[0.1, 0.4, 0.9, -0.9, 0.2, -0.5, 0.0, -0.8, -0.3, -0.2]]),
 )
 # The size of a step that is worth a try, number by number.
 STEPS = Weights(
@@ -84,9 +84,9 @@ STEPS = Weights(
     threshold=np.array([[0.6]]),
     softness=np.array([[0.2]]),
     shift_db=np.full((1, NUM_SHIFTS), 1.5),
-    index=np.full((1, NUM_FEATURES), 0.15),
-    silence=np.full((1, NUM_FEATURES), 0.25),
-    sensing_db=np.full((1, NUM_FEATURES), 0.7),
+    in_index=np.full((1, NUM_FEATURES), 0.15),
+    in_silence=np.full((1, NUM_FEATURES), 0.25),
+    in_sensing_db=np.full((1, NUM_FEATURES), 0.7),
 )
 # What numbers may be; all others are free.
 LEAST = {
@@ -114,7 +114,7 @@ def from_flat(numbers: Float[np.ndarray, "B D"]) -> Weights:
     parts: list[np.ndarray] = []
     for name, values in zip(Weights._fields, fields, strict=True):
         bounded = np.clip(values, LEAST.get(name, -np.inf), MOST.get(name, np.inf))
-        if name == "silence":
+        if name == "in_silence":
             # A team's size is no reason to be silent: teams larger than any trained on never began.
             bounded[:, FEATURES.index("team")] = 0.0
         parts.append(np.ascontiguousarray(bounded))

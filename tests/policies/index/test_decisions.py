@@ -21,9 +21,9 @@ PLAIN = START._replace(
     threshold=np.array([[0.0]]),
     softness=np.array([[0.0]]),
     shift_db=np.array([[1.0, 0.0, -3.0, 0.0, 0.0, 12.0]]),
-    index=np.zeros((1, 10)),
-    silence=np.zeros((1, 10)),
-    sensing_db=np.zeros((1, 10)),
+    in_index=np.zeros((1, 10)),
+    in_silence=np.zeros((1, 10)),
+    in_sensing_db=np.zeros((1, 10)),
 )
 
 
@@ -89,7 +89,7 @@ def test_an_octave_more_gain_begins_an_octave_earlier_and_draws_add_to_it():
 )
 def test_a_feature_moves_the_index_by_its_weight(feature, value):
     before = decisions([4.0, 4.0])[0][0]
-    after = decisions([4.0, 4.0], weighted("index", feature, 0.5))[0][0]
+    after = decisions([4.0, 4.0], weighted("in_index", feature, 0.5))[0][0]
     assert before - after == pytest.approx(0.5 * value / 8.0)
 
 
@@ -100,7 +100,7 @@ def test_a_robot_with_too_little_gain_is_silent_unless_it_never_sent():
 
 def test_features_change_the_gain_needed_by_two_octaves_at_most():
     for weight in (100.0, -100.0):
-        silence = weighted("silence", "crowd", weight)
+        silence = weighted("in_silence", "crowd", weight)
         least = 2.0 * 2.0 ** (-MOST_SILENCE if weight > 0.0 else MOST_SILENCE)
         assert np.isfinite(decisions([1.01 * least] * 2, silence)[0][0])
         assert np.isinf(decisions([0.99 * least] * 2, silence)[0][0])
@@ -120,7 +120,7 @@ def test_shifts_follow_the_slots_and_never_sense_farther_than_usual():
         0.0,
         MOST_SHIFT_DB,
     ]
-    loud = weighted("sensing_db", "crowd", 100.0)
+    loud = weighted("in_sensing_db", "crowd", 100.0)
     assert decisions([4.0] * 2, loud, phase=1)[1][0] == MOST_SENSED_DB
 
 

@@ -38,7 +38,7 @@ def test_numbers_in_a_row_and_by_name_are_the_same_numbers():
     assert same(
         from_tensors(as_tensors(from_tensors(as_tensors(START)))), from_tensors(as_tensors(START))
     )
-    assert by_name(START)["index"]["age"] == START.index[0, FEATURES.index("age")]
+    assert by_name(START)["in_index"]["age"] == START.in_index[0, FEATURES.index("age")]
 
 
 @pytest.mark.parametrize("name", sorted(LEAST.keys() | MOST.keys()))
@@ -51,8 +51,8 @@ def test_a_number_beyond_what_it_may_be_is_moved_there(name):
 
 
 def test_the_size_of_the_team_is_no_reason_to_be_silent():
-    row = START._replace(silence=np.ones((1, 10)))
-    silence = from_flat(flat(row)).silence[0]
+    row = START._replace(in_silence=np.ones((1, 10)))
+    silence = from_flat(flat(row)).in_silence[0]
     assert silence[FEATURES.index("team")] == 0.0
     assert np.sum(silence) == 9.0
 
