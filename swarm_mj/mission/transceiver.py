@@ -35,7 +35,7 @@ class Transceiver:
     )
     sensing_dbm: float | None = setting(
         None,
-        "power that csma and age-gain-csma sense",
+        "power that csma, age-gain-csma and index-csma sense",
         label="sensing threshold",
         unit="dBm",
         low=-200.0,

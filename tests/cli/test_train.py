@@ -16,6 +16,7 @@ from forks import files
 
 from swarm_mj.cli import main
 from swarm_mj.learning import held_out
+from swarm_mj.learning.index_session import IndexSession
 from swarm_mj.learning.run_folder import read_run
 from swarm_mj.learning.train import TrainingSession
 from swarm_mj.policies.stored import read_policy
@@ -58,6 +59,27 @@ def test_a_run_prints_its_evaluations_and_what_it_came_to(whole):
     for row in ("policy kept", "spatial-tdma", "greedy-oracle", "decisions", "minutes"):
         assert row in done.stdout
     assert "runs/whole: credit per robot, stationary, 4 robots" in done.stdout
+
+
+@pytest.mark.usefixtures("here")
+def test_an_index_is_trained_interrupted_and_flown_by_the_same_commands(here, capsys):
+    """Ctrl-C waits for the generation: 12 candidates in a mission of each of two sizes."""
+    index = ("--policy", "index-csma", "--robots", 4, 6, "--windows", 12, "--range-ratio", 1)
+    small = ("--missions", 2, "--held-out", 2, "--evaluate-every", 288, "--budget", 864)
+    with ctrl_c_at("_report", 20, of=IndexSession):
+        assert train("--out", "run", *index, *small) == 130
+    said = capsys.readouterr().err
+    assert "Interrupted: finishing this generation, then all is kept" in said
+    assert train("--out", "run", "--resume", "--budget", 864) == 0
+    said = capsys.readouterr().out
+    assert "run: index-csma by evolution, stationary, 4, 6 robots" in said
+    for label in ("Fly:", "Evaluate:", "Go on:"):
+        (line,) = (line for line in said.splitlines() if line.startswith(label))
+        arguments = shlex.split(line.removeprefix(label))[1:]
+        extra = {"Fly:": ["--no-record"], "Evaluate:": ["--episodes", "2"], "Go on:": []}[label]
+        assert main([*arguments, *extra]) == 0
+    assert main(["curves", "run"]) == 0
+    assert (here / "run" / "curve.csv").exists()
 
 
 @pytest.mark.usefixtures("here")
@@ -104,9 +126,9 @@ def test_the_commands_that_it_prints_work(whole, monkeypatch, capsys, label):
 
 
 @contextmanager
-def ctrl_c_at(method, *calls):
+def ctrl_c_at(method, *calls, of=TrainingSession):
     """Presses Ctrl-C in certain windows of the training, or of its evaluations."""
-    original, count = getattr(TrainingSession, method), itertools.count(1)
+    original, count = getattr(of, method), itertools.count(1)
 
     def pressing(session, *arguments):
         if next(count) in calls:
@@ -115,7 +137,7 @@ def ctrl_c_at(method, *calls):
 
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(TrainingSession, method, pressing)
+        patch.setattr(of, method, pressing)
         yield
     signal.signal(signal.SIGINT, before)
 
