@@ -22,7 +22,7 @@ class Search:
     variance: Float[np.ndarray, "D"]  # of each number's steps, over sigma²
     path: Float[np.ndarray, "D"]  # of the mean, by which variances change
     scaled_path: Float[np.ndarray, "D"]  # of the mean in steps of their size, by which sigma does
-    generation: int = 0  # that were told
+    generation: int = 0  # generations that have moved it
 
 
 @dataclass(frozen=True, kw_only=True)

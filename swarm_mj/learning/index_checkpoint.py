@@ -28,7 +28,7 @@ INDEX_CHECKPOINT_VERSION = 1
 
 @dataclass(kw_only=True)
 class State:
-    """What a run has come to between two generations."""
+    """The state of a run between two generations."""
 
     progress: Progress
     search: Search

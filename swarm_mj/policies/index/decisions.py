@@ -1,4 +1,4 @@
-"""What robots decide by their features: when they begin, who is silent, what is too loud."""
+"""Decisions by features: when robots begin, who is silent, and what is too loud."""
 
 from typing import NamedTuple
 
@@ -20,7 +20,7 @@ LEAST = 1e-9  # has a logarithm, where nothing is
 
 
 class Record(NamedTuple):
-    """What every robot remembers of itself, in B missions."""
+    """The memory that every robot has of itself, in B missions."""
 
     since_sent: Float[np.ndarray, "B N"]  # since its last packet [windows]
     has_sent: Bool[np.ndarray, "B N"]  # ever

@@ -31,7 +31,7 @@ KNOWS_ITSELF = np.float32(np.inf)  # in a neighbour's row, of the neighbour itse
 
 
 class Table(NamedTuple):
-    """What every robot notes of its neighbours, in B missions."""
+    """The notes of every robot on its neighbours, in B missions."""
 
     neighbour: Int16[np.ndarray, "B N R"]  # whose row it is, or NOBODY
     row: Int8[np.ndarray, "B N N"]  # which row a robot has, or NO_ROW
@@ -50,7 +50,7 @@ class Around(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """What a robot's packet would bring, as it believes, and the neighbourhood that this is of."""
+    """The news in each robot's next packet, as it believes, and the neighbourhood that it is for."""
 
     total: Float[np.ndarray, "B N"]  # rise of T at all in reach, sum over entries [windows]
     largest: Float[np.ndarray, "B N"]  # the part of one neighbour [windows]

@@ -14,7 +14,7 @@ NUM_SHIFTS = 6  # slots after which the usual shifts of the sensed power begin a
 
 
 class Features(NamedTuple):
-    """What a robot sees of itself, each about 0 in a usual moment and of the size 1."""
+    """A robot's situation as it sees it, each number about 0 at usual and of the size 1."""
 
     neighbours: float  # octaves of their number
     since_sent: float  # octaves of the time since its own last packet
