@@ -55,7 +55,6 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
 }
 
 
-INDEX = "index-csma"
 # What counts for the search of an index, beside missions and parts; credit and networks do not.
 OF_INDEX = ("policy", "robots", "missions", "train_windows", "seed", "evaluate_every", "held_out")
 
@@ -107,7 +106,7 @@ def asked_settings(
     `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
     own = _part("", given)
-    if own.get("policy") == INDEX:
+    if own.get("policy") == IndexCsma.NAME:
         return _index_settings(given)
     network = _part("network", given)
     ppo = _part("ppo", given)

@@ -10,6 +10,7 @@ import os
 import pkgutil
 import sys
 from collections.abc import Iterable, Iterator, Sequence
+from contextlib import suppress
 from importlib import import_module
 from pathlib import Path
 from typing import TypeGuard
@@ -17,6 +18,7 @@ from typing import TypeGuard
 from swarm_mj.mission import Mission
 from swarm_mj.policies.about import About, Listed, VariantOf
 from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
+from swarm_mj.policies.index.policy import IndexCsma
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
 from swarm_mj.policies.policy import (
@@ -26,7 +28,7 @@ from swarm_mj.policies.policy import (
     check_parameters,
 )
 from swarm_mj.policies.policy_arguments import PolicyArguments
-from swarm_mj.policies.policy_config import SUFFIX
+from swarm_mj.policies.policy_config import SUFFIX, IndexConfig
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.system.arguments import check_kind, did_you_mean, unwrapped
@@ -245,6 +247,22 @@ def about_of(name: str) -> About | None:
 def is_learned(name: str) -> bool:
     """Return whether a policy is a trained network: the shipped one, or a stored one."""
     return name == SHIPPED or is_stored(name)
+
+
+def takes_memory_as(name: str) -> str:
+    """Return the name of the policy whose memory a policy takes: its own, but for a stored index.
+
+    A file that cannot be read is said to be unsound where it is loaded.
+    """
+    if not is_stored(name):
+        return name
+    with suppress(ValueError, OSError, ModuleNotFoundError):
+        from swarm_mj.policies.stored import read_weights
+
+        _, config = read_weights(Path(name))
+        if isinstance(config, IndexConfig):
+            return IndexCsma.NAME
+    return name
 
 
 def is_own_policy(name: str) -> bool:

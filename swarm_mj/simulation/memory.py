@@ -5,7 +5,7 @@ peaks: those of flights of large teams should be right within 20 %, others withi
 """
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import about_of, is_learned, is_own_policy
+from swarm_mj.policies.registry import about_of, is_learned, is_own_policy, takes_memory_as
 from swarm_mj.system.needs import GB
 from swarm_mj.system.user_code import load
 
@@ -37,6 +37,7 @@ def policy_memory(policy: str, mission: Mission, num_missions: int = 1) -> float
     """
     if is_own_policy(policy):
         load("policy", policy)
+    policy = takes_memory_as(policy)
     if is_learned(policy):
         return learned_memory(mission.num_robots, num_missions)
     about = about_of(policy)
@@ -54,6 +55,6 @@ def learned_memory(num_robots: int, num_missions: int) -> float:
 def memory_growth(policy: str, mission: Mission) -> str:
     """Return what to say of a policy's memory where it grows with the cube of the team, or ""."""
     num = mission.num_robots
-    if not is_learned(policy) or num < REMEMBERING:
+    if not is_learned(takes_memory_as(policy)) or num < REMEMBERING:
         return ""
     return f"{policy} remembers {num:,} numbers for each of {num:,} x {num:,} pairs of robots"

@@ -3,6 +3,9 @@
 import pytest
 
 from swarm_mj.mission import paper
+from swarm_mj.policies.index.weights import START, as_tensors
+from swarm_mj.policies.policy_config import IndexConfig
+from swarm_mj.policies.stored import save_weights
 from swarm_mj.simulation.memory import (
     HEARD_ENTRY,
     LEARNED_PAIR,
@@ -23,6 +26,7 @@ MISSION = paper("random-walk", num_robots=10, num_windows=16)
     [
         ("tdma", 0.0),
         ("age-gain-csma", 8.0),
+        ("index-csma", 8.0 + 8.0 + 2 * 4.0 + 4.0 + 1.0 + 4.0 * 32),
         ("sotdma", 230.0),
         ("planner", 250.0 + 4.0 * 10),
         ("greedy-oracle", 60.0),
@@ -36,6 +40,15 @@ def test_tables_grow_with_pairs_and_missions_and_by_what_the_policy_says(policy,
 def test_a_network_takes_its_input_and_the_packets_that_it_remembers():
     expected = LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * 10) * 3 * 10**2
     assert policy_memory("gnn", MISSION, 3) == learned_memory(10, 3) == pytest.approx(expected)
+
+
+def test_a_stored_index_takes_the_memory_of_its_policy_and_no_networks(tmp_path):
+    config = IndexConfig(training={}, evaluation={}, commit=None, version="1")
+    path = str(save_weights(tmp_path / "mine", as_tensors(START), config))
+    large = paper("stationary", num_robots=1000)
+    assert policy_memory(path, large) == policy_memory("index-csma", large)
+    assert policy_memory(path, large) < 0.1 * learned_memory(1000, 1)
+    assert memory_growth(path, large) == ""
 
 
 def test_that_memory_grows_with_the_cube_of_the_team_is_said_where_it_is_most_of_it():

@@ -2,6 +2,7 @@
 
 import hashlib
 from collections.abc import Sequence
+from typing import ClassVar
 
 import numpy as np
 
@@ -41,8 +42,9 @@ class IndexCsma(SensingPolicy):
     same features say with how little gain a robot is silent, and how loud a channel may be for it.
     """
 
+    NAME: ClassVar = "index-csma"
     about = Listed(
-        name="index-csma",
+        name=NAME,
         origin=Leading(over=("age-gain-csma",)),
         rank=65,
         uses=(

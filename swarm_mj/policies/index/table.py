@@ -50,7 +50,7 @@ class Around(NamedTuple):
 
 
 class Gain(NamedTuple):
-    """The news in each robot's next packet, as it believes, and the neighbourhood that it is for."""
+    """The news in each robot's next packet, as it believes, and the neighbourhood it is for."""
 
     total: Float[np.ndarray, "B N"]  # rise of T at all in reach, sum over entries [windows]
     largest: Float[np.ndarray, "B N"]  # the part of one neighbour [windows]
