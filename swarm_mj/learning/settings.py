@@ -168,7 +168,7 @@ class Training:
         mission: What is flown, except for the team's size.
         other_missions: What else is flown, as many windows long; all are trained on together.
         robots: Sizes of the team, from 2 to `MAX_ROBOTS`; several are trained on together. Without
-            any, each mission has its own size.
+            any, which an index may be, each mission has its own.
         features: What the network sees of each teammate: the name of a feature set, or
             `module:Name`.
         own_network: The class of the network, `module:Name`, if it is a user's own.
@@ -318,6 +318,8 @@ class Training:
     def __post_init__(self) -> None:
         check(self)
         check_fit(self.network, self.features)
+        if not self.robots and self.policy == "gnn":
+            raise ValueError("robots must have at least 1 size")
         if self.policy == "index-csma" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is of a gnn; choose policy gnn, or reward aoi")
         if len(self.train_windows) > 2 or list(self.train_windows) != sorted(self.train_windows):

@@ -205,7 +205,7 @@ def test_one_who_stops_does_not_wait_for_the_flight_to_be_shown(viewer, tmp_path
 def test_the_time_of_showing_is_none_of_the_time_of_decisions(viewer, tmp_path):
     clock = SimpleNamespace(s=0.0)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("swarm_mj.learning.train.time.monotonic", lambda: clock.s)
+        patch.setattr("swarm_mj.learning.session.time.monotonic", lambda: clock.s)
 
         def show(*_):
             clock.s += 600.0
