@@ -237,6 +237,9 @@ FLIGHTS: dict[str, Flight] = {
     "age-gain-csma-stationary": flight("age-gain-csma", "stationary"),
     "age-gain-csma-random-walk": flight("age-gain-csma", "random-walk"),
     "age-gain-csma-flocking": flight("age-gain-csma", "flocking"),
+    "index-csma-stationary": flight("index-csma", "stationary"),
+    "index-csma-random-walk": flight("index-csma", "random-walk"),
+    "index-csma-flocking": flight("index-csma", "flocking"),
     "gossip-stationary": flight("gossip", "stationary"),
     "gossip-random-walk": flight("gossip", "random-walk"),
     "gossip-flocking": flight("gossip", "flocking"),
@@ -312,6 +315,7 @@ FLIGHTS: dict[str, Flight] = {
     "high-power-sotdma": flight("sotdma", high_power_fraction=0.5, high_power_db=10.0),
     "clock-offset": flight("tdma", "stationary", clock_offset_s=0.03),
     "clock-offset-csma": flight("csma", clock_offset_s=0.06),
+    "clock-offset-index-csma": flight("index-csma", clock_offset_s=0.06),
     "clock-drift": flight("gossip", clock_drift_ppm=5000.0),
     "clock-offset-drift-mst": flight("mst", "flocking", clock_offset_s=0.02, clock_drift_ppm=900.0),
     "clock-offset-rayleigh": flight("aloha", clock_offset_s=0.04, fading="rayleigh"),
@@ -319,6 +323,7 @@ FLIGHTS: dict[str, Flight] = {
     "noise-csma": flight("csma", noise_dbm=-94.0),
     "sensing-csma": flight("csma", sensing_dbm=-45.0),
     "sensing-age-gain-csma": flight("age-gain-csma", sensing_dbm=-52.0),
+    "sensing-index-csma": flight("index-csma", sensing_dbm=-52.0),
     "frequency": flight("gossip", frequency_hz=9e8),
     "harsh-tdma": flight("tdma", **HARSH),
     "harsh-planner-stationary": flight("planner", "stationary", num_windows=70, **HARSH),
@@ -346,6 +351,7 @@ FLIGHTS: dict[str, Flight] = {
     # Packets without room for all entries.
     "bit-rate-tdma": flight("tdma", bit_rate=8e3),
     "bit-rate-gossip": flight("gossip", "flocking", bit_rate=4e3),
+    "bit-rate-index-csma": flight("index-csma", "stationary", bit_rate=9e3),
     "bit-rate-mst": flight("mst", "stationary", bit_rate=12e3),
     "bit-rate-greedy-oracle": flight("greedy-oracle", "stationary", bit_rate=9e3),
     "bit-rate-planner": flight("planner", "stationary", bit_rate=30e3),
@@ -448,6 +454,10 @@ TRAININGS: dict[str, str] = {
     "training-robot-local": (
         f"{SHORT} --task random-walk --robots 6 --features local --edges paper --latent 8"
         " --silence-logit 1 --preset urban --budget 512 --evaluate-every 128"
+    ),
+    "training-index": (
+        "--policy index-csma --windows 20 --missions 2 --held-out 2 --task stationary --robots 5"
+        " --budget 1440 --evaluate-every 960"
     ),
     "training-team-paper": (
         f"{SHORT} --credit team --task random-walk --robots 6 --latent 8"
