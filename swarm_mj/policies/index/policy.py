@@ -34,7 +34,7 @@ TABLE_BYTES = 8.0 + 2 * 4.0 + 4.0 + 1.0 + 4.0 * MAX_ROWS
 
 
 class IndexCsma(SensingPolicy):
-    """CSMA in which a learned index says who goes first, who is silent, and what is too loud.
+    """CSMA in which a learned index says who goes first.
 
     Each robot keeps a table of what its neighbours know at least. So it knows about what its next
     packet would bring them, its gain. The gain and ten features of its situation, each with a
