@@ -1,6 +1,6 @@
 """The leaderboard: what every policy reaches on the benchmark, beside what it knows.
 
-    python tools/leaderboard.py    # make leaderboard: flies what is missing, and writes it
+    python tools/leaderboard.py    # make leaderboard: flies it if it was not yet, and writes it
 
 Missions are flown as `swarm-mj study run benchmark` flies them. An interrupted run continues.
 """
@@ -89,6 +89,16 @@ def cells_of(policy: str, rows: Rows, kinds: dict[str, Mission]) -> Rows:
     return found
 
 
+def check_all_flew(folder: Path) -> None:
+    """Raise ValueError if results lack a policy: one that was added since they were flown."""
+    missing = sorted(set(read_study(STUDY).policies) - set(_names(read([STUDY], folder))))
+    if missing:
+        raise ValueError(
+            f"{folder / STUDY}.csv lacks {', '.join(missing)}; remove it to fly all, or add what "
+            f"`swarm-mj study run {STUDY} --policy {missing[0]}` writes by --csv"
+        )
+
+
 def score(cells: Rows, baseline: Rows) -> float:
     """Return the geometric mean over all kinds of how many times the baseline's age an age is."""
     logs = [
@@ -132,6 +142,7 @@ def main() -> int:
         command = ("study", "run", STUDY, "--csv", flown, "--parquet", parquet, "--jobs", jobs)
         code = swarm_mj([*map(str, command), "--resume"])
     if code == DONE:
+        check_all_flew(folder)
         write_text(ROOT / "training" / "leaderboard.md", f"{TEXT}{table(folder)}\n")
     return code
 

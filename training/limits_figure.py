@@ -202,7 +202,10 @@ def _by_seed(path: Path, policy: str, compared: Compared, column: str) -> dict[i
     rows = rows[rows["policy"] == policy]
     for name, value in compared.where.items():
         rows = rows[rows[name] == value]
-    return dict(zip(rows["seed"].tolist(), rows[column].tolist(), strict=True))
+    costs = dict(zip(rows["seed"].tolist(), rows[column].tolist(), strict=True))
+    if len(costs) < len(rows):
+        raise ValueError(f"{path} has several kinds of missions that are {compared.head}")
+    return costs
 
 
 class _Age(NamedTuple):

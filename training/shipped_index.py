@@ -2,9 +2,9 @@
 
     python training/shipped_index.py
 
-Searches them by evolution on a mix of missions, 20 minutes on one core, and goes on with a search
-that has begun. The numbers of the policy that is kept, with the seed, the budget and the commit
-that found them, are written to `swarm_mj/policies/index/shipped.toml`.
+Searches them by evolution on a mix of missions, for 20 minutes or as many as are asked for, and
+goes on with a search that has begun. The numbers of the policy that is kept, with the seed, the
+budget and the commit that found them, are written to `swarm_mj/policies/index/shipped.toml`.
 """
 
 import sys
@@ -95,7 +95,8 @@ class ShippedIndex:
         """Search, then write the numbers; return the exit code."""
         check_outputs(Output("numbers", self.out, ".toml"))
         limits = Limits(minutes=self.minutes)
-        asked = TrainingRun(training=TRAINING, limits=limits, command=COMMAND)
+        command = f"{COMMAND} --minutes {self.minutes:g}"
+        asked = TrainingRun(training=TRAINING, limits=limits, command=command)
         console = Console(stderr=True, highlight=False, soft_wrap=True)
         has_begun = (self.run / SETTINGS).exists()
         with deferred_interrupt() as is_interrupted:

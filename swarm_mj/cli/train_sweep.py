@@ -158,7 +158,7 @@ def _folder_of(command: Sequence[str]) -> Path:
 def train_apart(command: Sequence[str]) -> Outcome:
     """Train in a process of its own, which may be killed and takes no other training with it."""
     with (
-        tempfile.TemporaryFile("w+") as heard,
+        tempfile.TemporaryFile("w+", encoding="utf-8", errors="replace") as heard,
         running([*PYTHON, "-m", "swarm_mj", *command], output=heard) as process,
     ):
         code = process.wait()

@@ -1,9 +1,11 @@
 """A search by evolution: CMA-ES whose covariance is diagonal.
 
 Ros and Hansen, A simple modification in CMA-ES achieving linear time and space complexity, PPSN X,
-2008. A generation draws candidates around a mean; the better half moves the mean, and what moved it
-changes the spread of each number. The state is a few arrays, so that a search goes on from a
-checkpoint to the last bit; packages that do the same keep more, and pickle it.
+2008: the covariance is learned (n + 2) / 3 times as fast as a full one. All other rates are those
+of Hansen, The CMA evolution strategy: a tutorial, arXiv 1604.00772, Table 1. A generation draws
+candidates around a mean; the better half moves the mean, and what moved it changes the spread of
+each number. The state is a few arrays, so that a search goes on from a checkpoint to the last bit;
+packages that do the same keep more, and pickle it.
 """
 
 import math
@@ -27,7 +29,7 @@ class Search:
 
 @dataclass(frozen=True, kw_only=True)
 class _Rates:
-    """How fast a search learns, by its numbers and candidates; the symbols are the article's."""
+    """How fast a search learns, by its numbers and candidates; the symbols are the tutorial's."""
 
     recombination: Float[np.ndarray, "M"]  # w: of the better half, the best first
     effective: float  # mu_eff: how many candidates the mean is of, in effect
@@ -101,7 +103,7 @@ def _usual_length(num_numbers: int) -> float:
 
 
 def _rates(num_numbers: int, num_candidates: int) -> _Rates:
-    """Return the article's rates, those of a diagonal covariance."""
+    """Return the tutorial's rates, with those of a diagonal covariance."""
     n = num_numbers
     better = num_candidates // 2
     falling = math.log((num_candidates + 1.0) / 2.0) - np.log(np.arange(1, better + 1))

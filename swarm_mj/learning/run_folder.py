@@ -216,7 +216,9 @@ def _index_needs(training: Training, limits: Limits, *, is_shown: bool) -> needs
     """Estimate a search for an index: the missions of all kinds, and those that choose."""
     flown = num_missions(training, limits.decisions or MAX_DECISIONS, 1 + OTHER_FLIGHTS)
     num_kinds = len(training.kinds)
-    of_each = training.evolution.candidates * -(-training.missions // num_kinds)
+    # Swarms of two sizes stay of each kind, if missions do not divide by the kinds.
+    times, rest = divmod(training.missions, num_kinds)
+    of_each = training.evolution.candidates * (2 * times + 1 if rest else times)
     memory = LIBRARIES + TORCH
     largest = 0.0
     for kind in training.kinds:  # their swarms stay, and missions begin anew in them

@@ -6,6 +6,7 @@ import leaderboard as tool
 import pytest
 from synthetic import result
 
+from swarm_mj.cli.study import read_study
 from swarm_mj.evaluation.results_files import write_results
 from swarm_mj.system.exit_codes import DONE, INTERRUPTED
 
@@ -83,7 +84,7 @@ def test_the_benchmarks_missions_stay_as_they_are():
 
 
 def test_the_leaderboard_is_written_from_what_is_flown(board, tmp_path, monkeypatch):
-    board({"tdma": 10.0})
+    board(dict.fromkeys(read_study("benchmark").policies, 10.0))
     (tmp_path / "training" / "results").mkdir(parents=True)
     (tmp_path / "benchmark.csv").rename(tmp_path / "training" / "results" / "benchmark.csv")
     monkeypatch.setattr(tool, "ROOT", tmp_path)
@@ -91,6 +92,12 @@ def test_the_leaderboard_is_written_from_what_is_flown(board, tmp_path, monkeypa
     text = (tmp_path / "training" / "leaderboard.md").read_text()
     assert text.startswith("# Leaderboard\n")
     assert "| `tdma` | T, M, P | 1.00 |" in text
+
+
+def test_a_policy_that_was_added_since_is_not_left_out_silently(board, tmp_path):
+    board({"tdma": 10.0})
+    with pytest.raises(ValueError, match=r"lacks age-gain-csma, .*--policy age-gain-csma"):
+        tool.check_all_flew(tmp_path)
 
 
 def test_what_is_missing_is_flown_first(tmp_path, monkeypatch):

@@ -1,9 +1,9 @@
 """The table in which a robot notes what its neighbours know, and what its packet would bring them.
 
-A row is a bound of T of one neighbour from below: what that neighbour has sent, what it must have
-decoded from others, and what the robot itself sent it. Rows of neighbours that leave go to others.
-Index order: `[b, i, r]` is row r of robot i; it is written from what robot i sent, decoded and
-believes only.
+A row is T of one neighbour, as the robot estimates it: what that neighbour has sent, what it is
+taken to have decoded from others, and a share of what the robot itself sent it. Rows of neighbours
+that leave go to others. Index order: `[b, i, r]` is row r of robot i; it is written from what robot
+i sent, decoded and believes only.
 """
 
 from typing import NamedTuple
@@ -35,8 +35,8 @@ class Table(NamedTuple):
 
     neighbour: Int16[np.ndarray, "B N R"]  # whose row it is, or NOBODY
     row: Int8[np.ndarray, "B N N"]  # which row a robot has, or NO_ROW
-    bound: Float32[np.ndarray, "B N R N"]  # at least this is the neighbour's T [windows]
-    announced: Float32[np.ndarray, "B N N"]  # T in the robot's own last packet [windows]
+    bound: Float32[np.ndarray, "B N R N"]  # the neighbour's T, as estimated [windows]
+    announced: Float32[np.ndarray, "B N N"]  # greatest T in the robot's own packets [windows]
     own: Float32[np.ndarray, "N"]  # room for one robot's next T
     ranges: Float[np.ndarray, "N"]  # room for how far away the others are
 

@@ -88,7 +88,7 @@ STEPS = Weights(
     in_silence=np.full((1, NUM_FEATURES), 0.25),
     in_sensing_db=np.full((1, NUM_FEATURES), 0.7),
 )
-# What numbers may be; all others are free.
+# What numbers may be; all others are free. Storing them in single precision moves none of them.
 LEAST = {
     "success": 0.3,
     "reach": 0.6,
@@ -113,12 +113,28 @@ def from_flat(numbers: Float[np.ndarray, "B D"]) -> Weights:
     fields = np.split(np.asarray(numbers, dtype=np.float64), ends[:-1], axis=1)
     parts: list[np.ndarray] = []
     for name, values in zip(Weights._fields, fields, strict=True):
-        bounded = np.clip(values, LEAST.get(name, -np.inf), MOST.get(name, np.inf))
+        bounded = np.clip(values, *bounds_of(name))
         if name == "in_silence":
             # A team's size is no reason to be silent: teams larger than any trained on never began.
             bounded[:, FEATURES.index("team")] = 0.0
         parts.append(np.ascontiguousarray(bounded))
     return Weights(*parts)
+
+
+def bounds_of(name: str) -> tuple[np.float32, np.float32]:
+    """Return the least and the greatest value that a field's numbers may have, as stored."""
+    return np.float32(LEAST.get(name, -np.inf)), np.float32(MOST.get(name, np.inf))
+
+
+def check_weights(weights: Weights) -> None:
+    """Raise ValueError for numbers that no search returns: robots with them may never begin."""
+    for name, values in weights._asdict().items():
+        least, most = bounds_of(name)
+        if np.any(values < least) or np.any(values > most):
+            raise ValueError(f"its {name} must be from {least:g} to {most:g}, not {values[0]}")
+    of_team = weights.in_silence[:, FEATURES.index("team")]
+    if np.any(of_team != 0.0):
+        raise ValueError(f"its weight of the team's size in silence must be 0, not {of_team[0]:g}")
 
 
 def as_tensors(weights: Weights) -> dict[str, Float32[np.ndarray, "..."]]:
@@ -127,8 +143,13 @@ def as_tensors(weights: Weights) -> dict[str, Float32[np.ndarray, "..."]]:
 
 
 def from_tensors(tensors: Mapping[str, np.ndarray]) -> Weights:
-    """Return what `as_tensors` was made of, to single precision."""
-    return Weights(*(tensors[name][None].astype(np.float64) for name in Weights._fields))
+    """Return what `as_tensors` was made of, to single precision.
+
+    Raises ValueError as `check_weights` does.
+    """
+    weights = Weights(*(tensors[name][None].astype(np.float64) for name in Weights._fields))
+    check_weights(weights)
+    return weights
 
 
 def repeated(weights: Weights, num_missions: int) -> Weights:

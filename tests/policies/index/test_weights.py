@@ -47,7 +47,7 @@ def test_a_number_beyond_what_it_may_be_is_moved_there(name):
     for limits, far in ((LEAST, -1e6), (MOST, 1e6)):
         if name in limits:
             row = START._replace(**{name: np.array([[far]])})
-            assert from_flat(flat(row))[place][0, 0] == limits[name]
+            assert from_flat(flat(row))[place][0, 0] == np.float32(limits[name])
 
 
 def test_the_size_of_the_team_is_no_reason_to_be_silent():
@@ -63,3 +63,18 @@ def test_each_row_flies_as_many_missions_one_by_one():
     assert six.first[:, 0].tolist() == [two.first[0, 0]] * 3 + [two.first[1, 0]] * 3
     with pytest.raises(ValueError, match="5 missions cannot fly as often by each of 2 rows"):
         repeated(two, 5)
+
+
+def test_numbers_that_no_search_returns_are_refused_and_bounds_survive_storage():
+    """A reach beyond the table's, no octaves, or silence by size: teams that never begin."""
+    for name in ("octaves", "reach"):
+        wrong = START._replace(**{name: np.array([[-1.0]])})
+        with pytest.raises(ValueError, match=f"its {name} must be from"):
+            from_tensors(as_tensors(wrong))
+    by_size = START.in_silence.copy()
+    by_size[0, FEATURES.index("team")] = 0.5
+    with pytest.raises(ValueError, match="of the team's size in silence must be 0"):
+        from_tensors(as_tensors(START._replace(in_silence=by_size)))
+    at_bound = from_flat(flat(START._replace(reach=np.array([[2.0]]))))
+    stored = from_tensors(as_tensors(at_bound))
+    assert flat(from_flat(flat(stored))).tobytes() == flat(stored).tobytes()
