@@ -100,7 +100,9 @@ def draw_curves(
     num_panels = len(figure.panels)
     origin = caption(figure, found)
     bottom_in = BOTTOM_IN + origin.count("\n") * CAPTION_IN
-    height_in = TOP_IN + num_panels * PANEL_IN + (num_panels - 1) * GAP_IN + bottom_in
+    num_names = max(len({curve.method for curve in shown}) for shown in costs)
+    panel_in = max(PANEL_IN, num_names * LINE_IN)
+    height_in = TOP_IN + num_panels * panel_in + (num_panels - 1) * GAP_IN + bottom_in
     with styled():
         drawing = Figure(figsize=(WIDTH_IN, height_in))
         grid = drawing.subplots(num_panels, sharex=True, squeeze=False)
@@ -109,7 +111,7 @@ def draw_curves(
             right=RIGHT,
             top=1.0 - TOP_IN / height_in,
             bottom=bottom_in / height_in,
-            hspace=GAP_IN / PANEL_IN,
+            hspace=GAP_IN / panel_in,
         )
         for axes, panel, shown in zip(grid[:, 0], figure.panels, costs, strict=True):
             _set_axes(axes, figure, panel, shown)

@@ -63,7 +63,7 @@ class IndexCsma(SensingPolicy):
             Information.DECODED_PACKETS,
         ),
         payload=None,
-        look=Look(label="index-csma", colour="#00a0a0", marker="h"),
+        look=Look(label="index-csma", colour="#bb0088", marker="X"),
         memory=PairMemory(bytes_per_pair=SENSING_MEMORY.bytes_per_pair + TABLE_BYTES),
     )
 
