@@ -203,7 +203,7 @@ class Training:
         True
     """
 
-    policy: TrainedPolicy = common_setting(
+    policy: TrainedPolicy = setting(
         "gnn",
         "what is trained: gnn, a network, by PPO; or index-csma, whose numbers are found by "
         "evolution",
