@@ -46,7 +46,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         "several are trained on together, 2 to 200 (default: 40)",
         "reflect, none (default: the preset's own)",
         f"task, range and so on, 1 to 10000 (default: {robot.held_out})",
-        f"(default: {BUDGETS['robot']}, team and index-csma: {BUDGETS['team']}; none with --minutes)",
+        f"(default: {BUDGETS['robot']}, team and index-csma: {BUDGETS['team']}; none with",
     ):
         assert text in shown
 
