@@ -58,22 +58,7 @@ class IndexSession(Session):
         self._begin()
         self._tensorboard = configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"])
 
-    def learn(self) -> None:
-        """Fly generation after generation until a limit or the listener ends it."""
-        progress = self.progress
-        patience = self._run.limits.patience
-        if progress.curve:  # what the run that is resumed has come to, if only to look at it
-            self._show(lambda _share: None)
-        while True:
-            self._count_time()
-            is_last = self._is_over() or not self._goes_on
-            # Less --patience may end a run between evaluations: the last numbers are judged first.
-            self._between_steps(is_last=is_last or progress.has_stalled(patience))
-            if is_last or not self._goes_on or progress.has_stalled(patience):
-                return
-            self._fly_generation()
-
-    def _fly_generation(self) -> None:
+    def _take_step(self) -> None:
         """Let all candidates of a generation fly the same new missions, and learn who did best."""
         training = self._training
         num = training.evolution.candidates

@@ -70,9 +70,24 @@ class Session(ABC):
         self._counted_s = time.monotonic()  # until when time is in the progress
         self._saved_s = -math.inf
 
-    @abstractmethod
     def learn(self) -> None:
-        """Train until a limit or the listener ends it."""
+        """Take step after step until a limit or the listener ends it."""
+        progress = self.progress
+        patience = self._run.limits.patience
+        if progress.curve:  # what the run that is resumed has come to, if only to look at it
+            self._show(lambda _share: None)
+        while True:
+            self._count_time()
+            is_last = self._is_over() or not self._goes_on
+            # Less --patience may end a run between evaluations: what acts last is judged first.
+            self._between_steps(is_last=is_last or progress.has_stalled(patience))
+            if is_last or not self._goes_on or progress.has_stalled(patience):
+                return
+            self._take_step()
+
+    @abstractmethod
+    def _take_step(self) -> None:
+        """Fly missions, and learn from them."""
 
     @abstractmethod
     def close(self) -> None:

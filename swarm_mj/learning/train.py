@@ -20,6 +20,7 @@ from swarm_mj.learning.ppo import make_model, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Listener, Progress
 from swarm_mj.learning.session import Session, record_evaluation
+from swarm_mj.learning.settings import TrainedPolicy
 from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import read_policy, save_gnn
@@ -74,23 +75,16 @@ class TrainingSession(Session, BaseCallback):
     def learn(self) -> None:
         """Alternate rollouts and passes over them until a limit or the listener ends it (III-C)."""
         model = self.ppo
-        progress = self.progress
-        patience = self._run.limits.patience
         model._setup_learn(0, self, reset_num_timesteps=model.num_timesteps == 0)
-        if progress.curve:  # what the run that is resumed has come to, if only to look at it
-            self._show(lambda _share: None)
+        super().learn()
+
+    def _take_step(self) -> None:
         # PPO's own loop knows no minutes and no stall, and would dump its logs by itself.
-        while True:
-            self._count_time()
-            is_last = self._is_over() or not self._goes_on
-            # Less --patience may end a run between evaluations: the last weights are judged first.
-            self._between_rollouts(is_last=is_last or progress.has_stalled(patience))
-            if is_last or not self._goes_on or progress.has_stalled(patience):
-                return
-            env = model.get_env()
-            assert env is not None
-            model.collect_rollouts(env, self, model.rollout_buffer, model.n_steps)
-            model.train()
+        model = self.ppo
+        env = model.get_env()
+        assert env is not None
+        model.collect_rollouts(env, self, model.rollout_buffer, model.n_steps)
+        model.train()
 
     def _on_step(self) -> bool:
         costs = self._env.costs
@@ -107,7 +101,7 @@ class TrainingSession(Session, BaseCallback):
         log_p = self.ppo.rollout_buffer.log_probs
         self.logger.record("train/entropy", -float(log_p.mean()))
 
-    def _between_rollouts(self, *, is_last: bool) -> None:
+    def _between_steps(self, *, is_last: bool) -> None:
         """Check the weights, then do what is due."""
         progress = self.progress
         # The last checkpoint was written before the rollout that broke the weights.
@@ -119,7 +113,7 @@ class TrainingSession(Session, BaseCallback):
         logged = self.logger.name_to_value
         means = {name: float(logged[name]) for name in OPTIMISER if name in logged}
         progress.optimiser = means or progress.optimiser  # of PPO's last passes over a rollout
-        self._between_steps(is_last=is_last)
+        super()._between_steps(is_last=is_last)
 
     def close(self) -> None:
         """Close TensorBoard's file."""
@@ -150,7 +144,7 @@ class TrainingSession(Session, BaseCallback):
         record_evaluation(self.logger, columns, decisions)
 
 
-SESSIONS: dict[str, type[Session]] = {"gnn": TrainingSession, "index-csma": IndexSession}
+SESSIONS: dict[TrainedPolicy, type[Session]] = {"gnn": TrainingSession, "index-csma": IndexSession}
 
 
 def train(
