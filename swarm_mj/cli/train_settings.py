@@ -20,7 +20,7 @@ from swarm_mj.cli.mission_options import (
 )
 from swarm_mj.cli.options import Given, Option, flags_of
 from swarm_mj.learning.settings import (
-    TURNLESS_SILENCE,
+    ORDERLY_SILENCE,
     PpoSettings,
     Training,
     usual_index_settings,
@@ -174,11 +174,11 @@ def check_of_index(given: Given) -> None:
 
 
 def _usual_silence(own: Given, training: Training) -> Given:
-    """Return the logit of silence that suits features without turns, if these are such."""
+    """Return the logit of silence that suits features with an order of turns, if these are such."""
     features = own["features"]
-    is_ours = features in FEATURE_SETS  # a user's own may have turns, too
-    if training.credit_assignment == "robot" and is_ours and not has_turns(features):
-        return {"silence_logit": TURNLESS_SILENCE}
+    is_ours = features in FEATURE_SETS  # only a user knows what the own ones say
+    if training.credit_assignment == "robot" and is_ours and has_turns(features):
+        return {"silence_logit": ORDERLY_SILENCE}
     return {}
 
 

@@ -2,7 +2,8 @@
 
 The difference reward of Wolpert and Tumer (2001): the window is replayed without the robot, through
 the same channel and by the same protocol. Its sum has the gradient of the team's gain, and a silent
-robot's credit is 0.
+robot's credit is 0. Replayed with a packet that a silent robot did not send, the window tells what
+it would have been worth (as in Foerster et al., 2018, where a critic guesses it).
 """
 
 import copy
@@ -30,16 +31,31 @@ def credits_of(
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None = None,
+    considered: Int[np.ndarray, "B N"] | None = None,
 ) -> Float[np.ndarray, "B N"]:
     """Return the age that the team would not have lost in a window without each robot.
 
-    T is that at the end of the window before, `now` the start of this one [windows]. The channel is
-    a `snapshot_channel` from before the window. Active robots, or all, count. A credit is
-    summed over pairs of robots [windows], and may be negative.
+    Args:
+        timestamp: T at the end of the window before [windows], [B N N].
+        position_m: Where the robots are, [B N 2].
+        recipient: Whom each robot addresses, [B N]; itself is silence.
+        channel: A `snapshot_channel` from before the window.
+        now: The start of the window [windows], [B].
+        is_active: Robots that have not failed, [B N]; without it, all count.
+        considered: Whom each robot might have addressed, [B N]: who does speak, its recipient, and
+            others anyone, or themselves. Without it, `recipient`.
+
+    Returns:
+        The credit of each robot's packet, sent or only considered, [B N], summed over pairs of
+        robots [windows]; it may be negative. Of silence it is 0.
     """
+    if considered is None:
+        considered = recipient
     if is_active is not None:
         recipient = recipient.copy()
         silence(recipient, is_active)
+        considered = considered.copy()
+        silence(considered, is_active)
         # Nothing is gained by news of a robot that has failed: it is not counted in the age.
         timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
 
@@ -59,41 +75,45 @@ def credits_of(
         )
 
     at_once = isinstance(channel, (FreeSpaceRadio, VaryingChannel))
-    if at_once:
-        return _credits_at_once(recipient, replayed)
-    return _credits_in_turn(recipient, replayed)
+    # Each packet is left out of a window that had it, or put into one that had not.
+    robots = np.arange(recipient.shape[1])
+    otherwise = np.where(recipient == robots, considered, robots)
+    by_windows = _lost_at_once if at_once else _lost_in_turn
+    lost = by_windows(recipient, otherwise, replayed)
+    return np.where(recipient == robots, 0.0 - lost, lost)
 
 
-def _credits_at_once(
-    recipient: Int[np.ndarray, "B N"], replayed: Replay
+def _lost_at_once(
+    recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"], replayed: Replay
 ) -> Float[np.ndarray, "B N"]:
-    """Replay all windows as rows of one batch: ten times faster than one by one."""
-    num_missions, num_robots = recipient.shape
-    mission, sender = np.nonzero(recipient != np.arange(num_robots))
-    without = recipient[mission]  # one row per sender: everyone's recipients without it
-    without[np.arange(sender.size), sender] = sender
+    """Return what windows lose if robots, one at a time, act otherwise: all as rows of one batch.
+
+    That is ten times faster than one by one.
+    """
+    num_missions = len(recipient)
+    mission, robot = np.nonzero(otherwise != recipient)
+    others = recipient[mission]  # a row for each robot that acts otherwise
+    others[np.arange(robot.size), robot] = otherwise[mission, robot]
     rows = np.concatenate([np.arange(num_missions), mission])  # the windows as they were come first
-    gained = replayed(rows, np.concatenate([recipient, without]))
-    credit = np.zeros(recipient.shape)
-    credit[mission, sender] = gained[mission] - gained[num_missions:]
-    return credit
+    gained = replayed(rows, np.concatenate([recipient, others]))
+    lost = np.zeros(recipient.shape)
+    lost[mission, robot] = gained[mission] - gained[num_missions:]
+    return lost
 
 
-def _credits_in_turn(
-    recipient: Int[np.ndarray, "B N"], replayed: Replay
+def _lost_in_turn(
+    recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"], replayed: Replay
 ) -> Float[np.ndarray, "B N"]:
     """Replay B missions at a time: a user's channel meets them as in flight, draws included."""
-    num_missions, num_robots = recipient.shape
-    robots = np.arange(num_robots)
-    missions = np.arange(num_missions)
+    missions = np.arange(len(recipient))
     together = replayed(missions, recipient)
-    sends = recipient != robots
-    credit = np.zeros(recipient.shape)
-    turn = np.cumsum(sends, axis=1) * sends  # 1 for the first sender of a mission, and so on
+    differs = otherwise != recipient
+    lost = np.zeros(recipient.shape)
+    turn = np.cumsum(differs, axis=1) * differs  # 1 for the first of a mission, and so on
     for n in range(1, int(turn.max(initial=0)) + 1):
-        gained = replayed(missions, np.where(turn == n, robots, recipient))
-        credit += np.where(turn == n, (together - gained)[:, None], 0.0)
-    return credit
+        gained = replayed(missions, np.where(turn == n, otherwise, recipient))
+        lost += np.where(turn == n, (together - gained)[:, None], 0.0)
+    return lost
 
 
 def snapshot_channel(channel: Kind) -> Kind:

@@ -98,11 +98,17 @@ class MissionBatch:
         self._see()
         check_width(self.features, self._extractor, self.graphs)
 
-    def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+    def step(
+        self,
+        recipient: Int[np.ndarray, "B N"],
+        considered: Int[np.ndarray, "B N"] | None = None,
+    ) -> Float[np.ndarray, "B N"]:
         """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
 
         Args:
             recipient: Whom each robot addresses, [B N], from 0 to N - 1.
+            considered: Whom it might have addressed, where it is silent: "credit" is that of these
+                packets as well; see `credits_of`.
 
         Returns:
             The reward of each robot, [B N]: minus the cost that `reward` names, in its unit, the
@@ -130,7 +136,13 @@ class MissionBatch:
         self.fly(recipient)
         states = swarm.states
         credit = credits_of(
-            before, states.position_m, recipient, channel, now=start, is_active=states.is_active
+            before,
+            states.position_m,
+            recipient,
+            channel,
+            now=start,
+            is_active=states.is_active,
+            considered=considered,
         )
         return credit / self.mission.num_robots**2  # a mean over pairs: team sizes count alike
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from gymnasium import spaces
 from gymnasium.utils import seeding
-from jaxtyping import Bool, Int
+from jaxtyping import Bool, Float, Int
 from stable_baselines3.common.vec_env import VecEnv
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvStepReturn
 
@@ -71,7 +71,7 @@ class SwarmVecEnv(VecEnv):
         done = np.zeros(self.num_envs, np.bool_)
         recipients = self._recipients()  # of all batches: if one is bad, none moves
         for batch, envs, recipient in zip(self.batches, self._envs, recipients, strict=True):
-            paid = batch.step(recipient)
+            paid = self._fly(batch, envs, recipient)
             reward[envs] = paid[:, : self._per_mission(batch)].ravel() / self.reward_unit
             done[envs] = batch.is_over
         # Of this window: a restart, below, forgets them.
@@ -131,6 +131,13 @@ class SwarmVecEnv(VecEnv):
         return recipients
 
     # Training's environment differs in the following.
+
+    def _fly(
+        self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
+    ) -> Float[np.ndarray, "B N"]:
+        """Fly one window of a batch, whose environments are these; return the robots' rewards."""
+        del envs
+        return batch.step(recipient)
 
     def _begin(self, n: int) -> None:
         """Begin other missions of batch n: of the seeds given, or else drawn from them."""

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 from gymnasium import spaces
-from jaxtyping import Bool
+from jaxtyping import Bool, Float, Int
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
@@ -30,7 +30,16 @@ class GraphVecEnv(SwarmVecEnv):
     negative mean age of information over the mission's duration, or the negative velocity
     variance, as in Fig. 6. Smaller teams are padded: per team with robots that do not exist, which
     are silent and see nothing.
+
+    Attributes:
+        recalls: Asks what the network remembers since its last decision, [E *robots H]; None unless
+            it has a memory.
+        considers: Asks whom robots might have addressed in their last decision, [E], where rewards
+            are to be those packets' credits as well; None where they are not.
     """
+
+    recalls: Callable[[], np.ndarray] | None = None
+    considers: Callable[[], np.ndarray] | None = None
 
     def __init__(self, training: Training, rng: np.random.Generator) -> None:
         """Begin missions, whose seeds `rng` draws; the first ones are cut off at different windows.
@@ -59,7 +68,6 @@ class GraphVecEnv(SwarmVecEnv):
         self._is_robot = np.arange(self.num_nodes) < np.array(sizes)[:, None]
         # What each robot remembers, row by row; None unless the network has a memory.
         self.memory: np.ndarray | None = None
-        self.recalls: Callable[[], np.ndarray] | None = None  # asks what the network remembers now
         memory_size = 0
         if training.own_network:
             memory_size = empty_network(training.network, training.own_network).memory_size
@@ -111,6 +119,13 @@ class GraphVecEnv(SwarmVecEnv):
         for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
             reward[envs] = scale.divided(reward[envs])
         return seen, reward, done, infos
+
+    def _fly(
+        self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
+    ) -> Float[np.ndarray, "B N"]:
+        if self.considers is None:
+            return batch.step(recipient)
+        return batch.step(recipient, self.considers()[envs].reshape(batch.shape))
 
     def _begin(self, n: int) -> None:
         if self.memory is not None:

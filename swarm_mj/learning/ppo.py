@@ -1,9 +1,9 @@
 """Stable-baselines3's PPO with the run's numbers (III-C), its networks and its rollout buffer."""
 
 import warnings
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 import torch
@@ -14,6 +14,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import DictRolloutBufferSamples, PyTorchObs, Schedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import Tensor
+from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
 
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import Device, PpoSettings, Training
@@ -21,7 +22,7 @@ from swarm_mj.policies.gnn.decisions import evaluated, recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
 from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.gnn.own_networks import check_one_by_one, empty_network, make_network
-from swarm_mj.policies.learned import sample
+from swarm_mj.policies.learned import IMPOSSIBLE, sample
 
 CPU = torch.device("cpu")
 
@@ -37,6 +38,7 @@ class DevicePpo(PPO):
         self._move(self.optimises_on)
         try:
             super().train()
+            policy_of(self).take_average()
         finally:
             self._move(CPU)
 
@@ -64,7 +66,7 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
     """
     torch.set_num_threads(training.threads)  # sums that are divided among them round differently
     ppo = training.ppo
-    drops = training.drops_silence
+    considers = training.considers_speech
     graphs = GraphVecEnv(training, np.random.default_rng(training.seed))
     env: VecEnv = graphs
     if training.reward == "velocity-variance":  # as in the authors' code
@@ -87,15 +89,18 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,  # NumPy's global generator takes no larger one
             device=CPU,
-            normalize_advantage=not drops,  # a credit's zero means something
-            rollout_buffer_class=ActiveRolloutBuffer if drops else DictRolloutBuffer,
-            rollout_buffer_kwargs={"silent_share": ppo.silent_share} if drops else None,
+            normalize_advantage=not considers,  # a credit's zero means something
+            rollout_buffer_class=SpeechRolloutBuffer if considers else DictRolloutBuffer,
             policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
     if training.own_network:
         check_one_by_one(policy_of(model).network, training.own_network)
     if graphs.memory is not None:
         graphs.recalls = policy_of(model).recalled
+    if considers:
+        assert isinstance(model.rollout_buffer, SpeechRolloutBuffer)
+        graphs.considers = policy_of(model).considered_recipient
+        model.rollout_buffer.considers = policy_of(model).considered
     model.optimises_on = optimising_device(device)
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
@@ -126,6 +131,19 @@ def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:
     return ppo.learning_rate * max(share, ppo.least_share)
 
 
+class Considered(NamedTuple):
+    """The packets of a window whose credit is asked for, those of a robot that stays silent, too.
+
+    Without discount the gradient of a robot's expected credit is the sum over recipients of its
+    probability's gradient times the credit: of packets sent or not. Few robots speak in a window,
+    so several times as many rows teach something as if only packets sent did, and a row costs the
+    same. Which of the silent are considered is drawn, in proportion to their odds of speech.
+    """
+
+    recipient: Int[Tensor, "E"]  # the one addressed, if the robot speaks; itself: none considered
+    weight: Float[Tensor, "E"]  # of its credit, so that rows' chances to be considered cancel
+
+
 class GnnActorCritic(ActorCriticPolicy):
     """Logits over recipients for every robot, and one value for every environment.
 
@@ -139,6 +157,7 @@ class GnnActorCritic(ActorCriticPolicy):
         self._training = training
         self._shape = training.network
         self._remembered: Tensor | None = None
+        self._considered: Considered | None = None
         super().__init__(*given, **others)  # spaces and the rate's schedule come from PPO
 
     def _build(self, lr_schedule: Schedule) -> None:
@@ -152,6 +171,23 @@ class GnnActorCritic(ActorCriticPolicy):
         self.optimizer = torch.optim.Adam(
             self.parameters(), lr=lr_schedule(1.0), foreach=True, **self.optimizer_kwargs
         )
+        # What flies: the weights of late differ from one rollout to the next more than they learn.
+        kept = self._training.ppo.kept
+        self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(kept))
+        self.average.requires_grad_(False)
+
+    def take_average(self) -> None:
+        """Take the network's weights as they now are into the average."""
+        self.average.update_parameters(self.network)
+
+    def considered(self) -> Considered:
+        """Return the packets considered in the last decision."""
+        assert self._considered is not None
+        return self._considered
+
+    def considered_recipient(self) -> Int[np.ndarray, "E"]:
+        """Return whom they are to."""
+        return self.considered().recipient.numpy()
 
     def recalled(self) -> Float[np.ndarray, "E *robots H"]:
         """Return what robots remember since their last decision."""
@@ -159,10 +195,10 @@ class GnnActorCritic(ActorCriticPolicy):
         return self._remembered.numpy()
 
     def acting_network(self) -> Network:
-        """Return a copy of the network that acts, without what values."""
+        """Return a copy of the average of the network that acts, without what values."""
         network = empty_network(self._shape, self._training.own_network)
         weights: dict[str, Tensor] = {}
-        for name, tensor in self.network.state_dict().items():
+        for name, tensor in self.average.module.state_dict().items():
             if name in ("output.weight", "output.bias"):
                 tensor = tensor[: self._shape.num_outputs]  # without the value's row, if it has one
             weights[name] = tensor.detach().cpu().clone()
@@ -171,10 +207,11 @@ class GnnActorCritic(ActorCriticPolicy):
 
     def take_acting_network(self, given: Network) -> None:
         """Begin with another network's weights; its shape is this one's."""
-        own = self.network.state_dict()
-        with torch.no_grad():
-            for name, tensor in given.state_dict().items():
-                own[name][: len(tensor)].copy_(tensor)  # a value's row, the last, stays as drawn
+        for network in (self.network, self.average.module):
+            own = network.state_dict()
+            with torch.no_grad():
+                for name, tensor in given.state_dict().items():
+                    own[name][: len(tensor)].copy_(tensor)  # a value's row, the last, stays
 
     def _robots(
         self, obs: dict[str, Tensor], owner: Int[Tensor, "R"], is_valued: Bool[Tensor, "R N"]
@@ -229,9 +266,14 @@ class GnnActorCritic(ActorCriticPolicy):
     def forward(
         self, obs: PyTorchObs, deterministic: bool = False
     ) -> tuple[Int[Tensor, "E *robots"], Float[Tensor, "E"], Float[Tensor, "E"]]:
-        """Actions, values and the actions' log-probabilities."""
+        """Actions, values and log-probabilities, of the actions or of what is considered."""
         logits, value = self.logits_and_value(obs)
         actions = logits.argmax(-1) if deterministic else draw(logits)
+        if self._training.considers_speech:
+            assert isinstance(obs, dict)
+            own = obs["owner"].long().squeeze(1)
+            self._considered = consider(logits, own, actions, self._training.ppo.considered)
+            return actions, value, log_probability(logits, self._considered.recipient)
         return actions, value, log_probability(logits, actions)
 
     def evaluate_actions(
@@ -260,6 +302,30 @@ def draw(logits: Float[Tensor, "*rows N"]) -> Int[Tensor, "*rows"]:
     return torch.from_numpy(sample(rows, uniform)).view(logits.shape[:-1])
 
 
+def consider(
+    logits: Float[Tensor, "E N"],
+    own: Int[Tensor, "E"],
+    actions: Int[Tensor, "E"],
+    per_packet: float,
+) -> Considered:
+    """Draw what packets are considered: all that are sent, and some that are not.
+
+    A row is considered with `per_packet` times the probability q of its speech, 1 at most, and
+    never less than it speaks. Its recipient is drawn as if it spoke.
+    """
+    log_p = logits.double().log_softmax(-1)
+    silence = log_p.gather(1, own[:, None]).squeeze(1).exp()
+    q = 1.0 - silence
+    chance = (per_packet * q).clamp(max=1.0)
+    # Who speaks is considered anyway; of who is silent, as many as then lack.
+    extra = torch.where(silence > 0.0, (chance - q) / silence, 0.0)
+    speech = log_p.scatter(1, own[:, None], IMPOSSIBLE)
+    is_extra = (torch.rand(len(q)) < extra) & (actions == own)
+    recipient = torch.where(is_extra, draw(speech), actions)
+    weight = (per_packet * q).clamp(min=1.0)
+    return Considered(recipient=recipient, weight=weight.float())
+
+
 def log_probability(
     logits: Float[Tensor, "E *robots N"], actions: Int[Tensor, "E *robots"]
 ) -> Float[Tensor, "E"]:
@@ -275,26 +341,46 @@ def entropy(logits: Float[Tensor, "E *robots N"]) -> Float[Tensor, "E"]:
     return each.flatten(1).sum(1)
 
 
-class ActiveRolloutBuffer(DictRolloutBuffer):
-    """Yields the rows that transmitted, and a share of the silent ones.
+class SpeechRolloutBuffer(DictRolloutBuffer):
+    """Yields the rows whose speech is considered; their actions are to whom.
 
-    Without discount a robot's advantage is its credit, and a silent robot's is 0: its row adds
-    nothing to the policy's gradient. So most of the rows, which cost as much as the others, can be
-    left out; some stay for the entropy. Credits are not normalised, for their zero means something.
+    Without discount a robot's advantage is its credit, and silence has none: of the other rows
+    nothing is learned, and they cost as much. Credits are not normalised, for their zero means
+    something.
 
-    What PPO logs of its passes (value, clipping, divergence) is over the rows kept, among which
-    transmissions are more frequent than in the rollout. Values, which nothing reads without
-    discount, are learned from these rows, too.
+    What PPO logs of its passes (value, clipping, divergence) is over the rows kept. Values, which
+    nothing reads without discount, are learned from these rows, too.
+
+    Attributes:
+        considers: Asks for what is considered in the window that is added.
     """
 
-    def __init__(self, *given: Any, silent_share: float, **others: Any) -> None:
-        self._silent_share = silent_share
-        super().__init__(*given, **others)  # sizes and spaces come from PPO
+    considers: Callable[[], Considered]
+
+    def reset(self) -> None:
+        """Begin a rollout."""
+        super().reset()
+        self.weights = np.ones_like(self.rewards)
+
+    def add(
+        self,
+        obs: dict[str, np.ndarray],
+        action: np.ndarray,
+        reward: np.ndarray,
+        episode_start: np.ndarray,
+        value: Tensor,
+        log_prob: Tensor,
+    ) -> None:
+        """Add a window, as the base does, with what is considered in place of what was done."""
+        recipient, weight = self.considers()
+        self.weights[self.pos] = weight.numpy()
+        action = recipient.numpy()[:, None]
+        super().add(obs, action, reward, episode_start, value, log_prob)
 
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:
         """Advantages and returns are the rewards; what comes later is worth nothing."""
         del last_values, dones
-        self.advantages[...] = self.rewards
+        self.advantages[...] = self.rewards * self.weights
         self.returns[...] = self.rewards
 
     def get(self, batch_size: int | None = None) -> Generator[DictRolloutBufferSamples, None, None]:
@@ -310,8 +396,7 @@ class ActiveRolloutBuffer(DictRolloutBuffer):
             for name in ("actions", "values", "log_probs", "advantages", "returns"):
                 setattr(self, name, getattr(self, name).reshape(num_rows, 1))
             self.generator_ready = True
-        is_active = self.actions[:, 0] != self.observations["owner"][:, 0]
-        is_kept = is_active | (np.random.random(num_rows) < self._silent_share)  # noqa: NPY002
+        is_kept = self.actions[:, 0] != self.observations["owner"][:, 0]
         kept = np.random.permutation(np.flatnonzero(is_kept))  # noqa: NPY002
         num_batches = max(1, round(num_rows / (batch_size or num_rows)))
         for rows in np.array_split(kept, num_batches):

@@ -43,7 +43,7 @@ MAX_CURVE_BYTES = 10_000_000
 # Team decisions, by the credit or the policy; the paper's for the paper's way.
 BUDGETS = {"robot": 200_000, "team": 2_000_000, "index-csma": 2_000_000}
 PATIENCE = {"robot": 8, "team": 40, "index-csma": 8}  # evaluations
-KEPT_ROWS = 0.4  # share that PPO passes over where it drops most silent rows; rather too high
+KEPT_ROWS = 0.5  # share that PPO passes over where it considers speech; rather too high
 WINDOW_BYTES = 2.0  # of the checkpoint, for each robot and window of a mission
 CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
 
@@ -257,7 +257,7 @@ def passes_bytes(training: Training) -> float:
     ppo = training.ppo
     shape = training.network
     rows = training.missions * nodes * ppo.num_steps / ppo.num_minibatches
-    kept = KEPT_ROWS if training.drops_silence else 1.0
+    kept = KEPT_ROWS if training.considers_speech else 1.0
     directions = 2 if shape.edges == "both" else 1
     layers = (shape.receptive_field + 1) * (shape.depth + 1) * (2 + directions)
     networks = 1 if training.shares_trunk else 2

@@ -31,8 +31,8 @@ HELD_OUT_SEED = 500_000  # of evaluations during training
 CHOICE_SEED = 510_000  # of those that choose a policy
 TEST_SEED = 520_000  # of those that tell its cost
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
-# Where no turns let a robot speak, training begins sooner with one of 40 robots in seven speaking.
-TURNLESS_SILENCE = 5.5
+# Where an order of turns lets a robot speak, the others begin all but silent.
+ORDERLY_SILENCE = 7.0
 # A generation is thousands of decisions, so an evaluation every 10,000 would follow each of them.
 INDEX_EVALUATED_EVERY = 200_000
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
@@ -59,14 +59,16 @@ class PpoSettings:
         value: Weight of the value's squared error.
         max_gradient_norm: The norm to which gradients are clipped.
         adam_epsilon: Adam's epsilon.
-        silent_share: The share of silent rows that training keeps, where they have no credit.
+        considered: How many packets have a credit for each that is sent, without discount: robots
+            might have sent the others.
+        kept: The weight of older weights in their average, which flies; 0 is none.
 
     Raises:
         ValueError: A value is not of its kind, or out of its range.
 
     Example:
         >>> PpoSettings(learning_rate=3e-4).num_epochs
-        2
+        3
     """
 
     learning_rate: float = setting(
@@ -77,10 +79,10 @@ class PpoSettings:
         high=1.0,
     )
     decay: float = setting(0.95, low=0.0, high=1.0)  # of the learning rate ...
-    decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
-    least_share: float = setting(0.1, low=0.0, high=1.0)  # ... but not below this share of it
+    decay_steps: int = setting(300, low=1, high=10**9)  # ... in this many optimiser steps ...
+    least_share: float = setting(0.03, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(
-        32,
+        16,
         "windows of each mission in a rollout",
         label="rollout",
         flag="--rollout-windows",
@@ -90,7 +92,7 @@ class PpoSettings:
     num_minibatches: int = setting(
         10, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
     )
-    num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
+    num_epochs: int = setting(3, "passes over a rollout", low=1, high=1000)
     discount: float = setting(
         0.0,
         "gamma; 0: a packet's credit is that of its own window alone",
@@ -104,7 +106,8 @@ class PpoSettings:
     value: float = setting(0.5, low=0.0, high=1.0)  # weight of the value's squared error
     max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)
     adam_epsilon: float = setting(1e-6, low=1e-12, high=1e6)
-    silent_share: float = setting(0.1, low=0.0, high=1.0)  # of silent rows
+    considered: float = setting(5.0, low=1.0, high=1000.0)  # packets, for each that is sent
+    kept: float = setting(0.95, low=0.0, high=0.9999)  # of the average, with each rollout
 
     def __post_init__(self) -> None:
         check(self)
@@ -146,11 +149,12 @@ PAPER_TEAM_PPO = PpoSettings(
     clips_value=True,
     entropy=1e-6,
     value=0.5,
+    kept=0.0,
 )
 # The code's value loss has an extra 1/2.
 REFERENCE_TEAM_PPO = replace(PAPER_TEAM_PPO, num_minibatches=4, value=0.25)
 ROBOTS_NETWORK = GnnShape(
-    num_features=num_features("extended"), latent=32, depth=2, receptive_field=1, edges="both"
+    num_features=num_features("turns"), latent=32, depth=2, receptive_field=1, edges="both"
 )
 
 
@@ -199,7 +203,7 @@ class Training:
         ValueError: A value is unknown, out of range, or does not go with another.
 
     Example:
-        >>> Training(mission=paper("stationary"), robots=(10, 20)).drops_silence
+        >>> Training(mission=paper("stationary"), robots=(10, 20)).considers_speech
         True
     """
 
@@ -226,7 +230,7 @@ class Training:
         high=MAX_ROBOTS,
     )
     features: str = setting(
-        "extended",
+        "turns",
         f"what the network sees of each teammate: {', '.join(FEATURE_SETS)}, or module:Name of "
         "your own",
         reads=files_named,
@@ -242,16 +246,18 @@ class Training:
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network
-    # Added to the logit of silence, except in a robot's own turn: odds of e^7 to 1.
+    # Added to the logit of silence, except in a robot's own turn: training begins with one of 40
+    # robots in seven speaking.
     silence_logit: float = setting(
-        7.0,
+        5.5,
         "bias towards silence, outside a robot's turn",
-        shown=f"7, features without turns: {TURNLESS_SILENCE:g}, team: the preset's own",
+        shown=f"5.5, extended: {ORDERLY_SILENCE:g}, team: the preset's own",
         low=-100.0,
         high=100.0,
     )
+    # A team in which nobody gets through would else jam for good: all think that they are due.
     most_speech: float = setting(
-        NO_BOUND,
+        0.5,
         "probability with which a robot speaks in a window at most, outside its turn; stored with "
         "the policy; 1: no bound",
         label="most-speech",
@@ -265,7 +271,7 @@ class Training:
     )
     # Early on, first news lowers ages by few windows and earns next to nothing.
     unknown_age: float = setting(
-        0.0,
+        30.0,
         "how much older than the mission a teammate never heard of counts in credits; more lets "
         "robots speak sooner",
         label="unknown-age",
@@ -288,13 +294,13 @@ class Training:
     )
     # The first windows are the hardest: who begins more often practises them more.
     train_windows: tuple[int, ...] = setting(
-        (),
+        (40, 250),
         "windows after which missions in training begin anew, if they have more; of two, the least "
         "and the most of a number drawn for each; evaluations fly all of --windows",
         label="train-windows",
         low=1,
         high=MAX_DECISIONS,
-        shown="--windows",
+        shown="40 250, team and index-csma: --windows",
     )
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
     seed: int = common_setting(0, "the same seed is the same policy", low=0, high=MAX_SEED)
@@ -396,8 +402,8 @@ class Training:
         return " ".join(f"--{kind} {name:.200}" for kind, name in self.own.items())
 
     @property
-    def drops_silence(self) -> bool:
-        """True if silent rows, which without discount have no credit, may be left out."""
+    def considers_speech(self) -> bool:
+        """True if credits of packets that were not sent teach as much as of those that were."""
         return self.credit_assignment == "robot" and self.ppo.discount == 0.0
 
 
@@ -425,6 +431,7 @@ def usual_index_settings(mission: Mission, robots: Sequence[int], seed: int = 0)
         robots=tuple(robots),
         seed=seed,
         missions=4,
+        train_windows=(),
         evaluate_every=INDEX_EVALUATED_EVERY,
     )
 
@@ -470,6 +477,9 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
         network=network,
         shares_trunk=False,
         silence_logit=0.0 if is_reference else EVEN_SILENCE,
+        most_speech=NO_BOUND,
+        unknown_age=0.0,
+        train_windows=(),
         ppo=REFERENCE_TEAM_PPO if is_reference else PAPER_TEAM_PPO,
         missions=32,
     )

@@ -100,7 +100,7 @@ def test_a_line_is_called_by_what_tells_it_apart_or_else_by_its_folder(runs):
     whole = [_read(runs / name) for name in CURVES]
     assert list(_lines(whole)) == ["2 seeds"]
     assert list(_lines(whole[:1])) == [f"{runs}/runs/a-1"]
-    change(runs / "runs/a-2", '"silent_share": 0.1', '"silent_share": 0.2')  # is no option
+    change(runs / "runs/a-2", '"kept": 0.95', '"kept": 0.9')  # is no option
     lines = list(_lines([_read(runs / name) for name in CURVES]))
     assert lines == [f"{runs}/runs/a-1", f"{runs}/runs/a-2"]
     change(runs / "runs/a-2", '"num_epochs": 2', '"num_epochs": 3')

@@ -11,7 +11,7 @@ from swarm_mj.cli import main, parse
 from swarm_mj.cli.train import asked_limits
 from swarm_mj.cli.train_settings import asked_settings, refuse_others
 from swarm_mj.learning.run_folder import BUDGETS, Limits
-from swarm_mj.learning.settings import TURNLESS_SILENCE, usual_settings
+from swarm_mj.learning.settings import ORDERLY_SILENCE, usual_settings
 from swarm_mj.mission import paper
 
 
@@ -102,11 +102,12 @@ def test_features_bring_the_networks_inputs_along_and_presets_the_papers_way():
     assert code.mission.half_duplex == "eavesdroppers"
 
 
-def test_robots_begin_less_silent_where_no_turns_let_them_speak():
-    assert asked("--features", "extended") == asked()
-    for features in ("buffer", "local", "paper"):
-        assert asked("--features", features).silence_logit == TURNLESS_SILENCE < 7.0
-        assert asked("--features", features, "--silence-logit", 7).silence_logit == 7.0
+def test_robots_begin_more_silent_where_an_order_of_turns_lets_them_speak():
+    assert asked("--features", "turns") == asked()
+    for features in ("turns", "buffer", "local", "paper"):
+        assert asked("--features", features).silence_logit == 5.5 < ORDERLY_SILENCE
+    assert asked("--features", "extended").silence_logit == ORDERLY_SILENCE
+    assert asked("--features", "extended", "--silence-logit", 5).silence_logit == 5.0
     team = usual_settings("team", paper("stationary"), (40,))
     assert asked("--credit", "team", "--features", "paper") == team
     begun = tiny_config(tiny_network("buffer"), "buffer")

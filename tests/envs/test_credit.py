@@ -24,10 +24,11 @@ def random_recipients(rng, shape, share):
     return np.where(rng.random(shape) < share, rng.integers(0, shape[1], shape), silence)
 
 
-def credits_by_replay(swarm, channel, buffers, recipient, now, unknown_age=0.0):
+def credits_by_replay(swarm, channel, buffers, recipient, considered, now, unknown_age=0.0):
     """Every robot silenced in turn, all else as it was, by the public protocol on copies.
 
-    Only pairs of robots that still work count; what is still unknown counts as older.
+    And those that were silent speak to whom they considered. Only pairs of robots that still work
+    count; what is still unknown counts as older.
     """
     on = swarm.states.is_active
     counted = 1.0 if on is None else on[:, :, None] & on[:, None, :]
@@ -45,16 +46,20 @@ def credits_by_replay(swarm, channel, buffers, recipient, now, unknown_age=0.0):
     np.testing.assert_array_equal(together, worth(swarm.buffers))
     credit = np.zeros(recipient.shape)
     for i in range(recipient.shape[1]):
-        without = recipient.copy()
+        without, with_it = recipient.copy(), recipient.copy()
         without[:, i] = i
-        credit[:, i] = together - total_after(without)
+        with_it[:, i] = considered[:, i]
+        credit[:, i] = total_after(with_it) - total_after(without)
     return credit
 
 
 def assert_rewards_are_those_of_a_replay(
-    mission, seeds, num_windows, share, channel=None, unknown_age=0.0
+    mission, seeds, num_windows, share, channel=None, unknown_age=0.0, also_considered=0.0
 ):
-    """In each window of random talk; returns all credits."""
+    """In each window of random talk; returns all credits.
+
+    A share of the silent considers speech.
+    """
     its = {"components": Components(channel=channel), "unknown_age": unknown_age}
     batch = MissionBatch(mission, len(seeds), features="paper", reward="credit", **its)
     batch.restart(seeds)
@@ -63,10 +68,16 @@ def assert_rewards_are_those_of_a_replay(
         swarm, now = batch.flown, batch.flown.now
         buffers, before = copy.deepcopy(swarm.buffers), snapshot_channel(swarm.channel)
         recipient = random_recipients(rng, batch.shape, share)
-        found = batch.step(recipient) * mission.num_robots**2
-        expected = credits_by_replay(swarm, before, buffers, recipient, now, unknown_age)
+        silent = recipient == np.arange(mission.num_robots)
+        others = random_recipients(rng, batch.shape, also_considered)
+        considered = np.where(silent, others, recipient)
+        asked = (considered,) if also_considered else ()
+        found = batch.step(recipient, *asked) * mission.num_robots**2
+        expected = credits_by_replay(
+            swarm, before, buffers, recipient, considered, now, unknown_age
+        )
         np.testing.assert_allclose(found, expected, atol=1e-9)
-        assert np.all(found[recipient == np.arange(mission.num_robots)] == 0.0)
+        assert np.all(found[considered == np.arange(mission.num_robots)] == 0.0)
         assert np.all(found[~batch.is_active] == 0.0)
         credited.append(found)
     return np.array(credited)
@@ -119,6 +130,20 @@ def test_a_window_replayed_for_credit_meets_the_same_world(mission, channel):
     credit = assert_rewards_are_those_of_a_replay(mission, [4, 2, 3], 16, 0.35, channel)
     assert np.count_nonzero(credit) > 10
     assert np.any(credit < 0.0)  # some packet destroyed another
+
+
+@pytest.mark.parametrize(
+    ("mission", "channel"),
+    [(WALKING, None), (FADED, None), (WALKING, Lossy(WALKING)), (FAILING, None)],
+    ids=["free space", "fades and losses", "a channel that draws", "robots that fail"],
+)
+def test_a_packet_only_considered_has_the_credit_that_it_would_have_had(mission, channel):
+    both = assert_rewards_are_those_of_a_replay(
+        mission, [4, 2, 3], 16, 0.2, channel, also_considered=0.5
+    )
+    sent = assert_rewards_are_those_of_a_replay(mission, [4, 2, 3], 16, 0.2, channel)
+    assert np.count_nonzero(both) > 2 * np.count_nonzero(sent)
+    assert np.any(both < 0.0)
 
 
 @pytest.mark.parametrize("mission", [WALKING, FAILING], ids=["walking", "robots that fail"])

@@ -11,16 +11,23 @@ from swarm_mj.learning.selection import CurveRow, HeldOutCosts
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.learning.train import train
 from swarm_mj.mission import paper
+from swarm_mj.policies.gnn.feature_sets import num_features
 
 torch.set_num_threads(1)  # tests share the machine's cores
 
 
 def small_training(credit="robot", task="stationary", sizes=(5,), discount=None, **changes):
-    """Settings of tiny networks on short missions; rollouts of 32 decisions, 64 of two sizes."""
+    """Settings of tiny networks on short missions; rollouts of 32 decisions, 64 of two sizes.
+
+    Per robot they see turns of an order, in which no bound holds, and credits are as they are.
+    """
     mission = paper(task, num_robots=sizes[0], num_windows=20, range_ratio=0.6)
     its = usual_settings(credit, mission, sizes, seed=3)
     ppo = replace(its.ppo, num_steps=8, num_minibatches=3, num_epochs=2)
     network = replace(its.network, latent=6, depth=2, receptive_field=1)
+    if credit == "robot":
+        network = replace(network, num_features=num_features("extended"))
+        its = replace(its, features="extended", network=network, unknown_age=0.0)
     usual = {
         "ppo": ppo if discount is None else replace(ppo, discount=discount),
         "network": network,

@@ -107,6 +107,8 @@ def test_log_probabilities_entropies_and_values_are_those_of_a_loop_over_robots(
     model, training = model_of(credit, preset, sizes, most_speech)
     observation = after_some_windows(model)
     actions, value, log_p = model.policy(observation)
+    if credit == "robot":
+        actions = model.policy.considered().recipient
     again = model.policy.evaluate_actions(observation, actions)
     expected = {"value": [], "log_p": [], "entropy": []}
     is_at_bound = []
@@ -222,7 +224,7 @@ def test_a_network_of_ones_own_acts_as_in_training_without_its_value():
     acting = policy_of(model).acting_network()
     trained = policy_of(model).network
     assert trained.output.out_features == acting.output.out_features + 1 == 2
-    node, parent = torch.randn(5, 5, 18), torch.full((5, 5), -1)
+    node, parent = torch.randn(5, 5, training.network.num_features), torch.full((5, 5), -1)
     memory = acting.remember(node, parent, torch.arange(5), torch.zeros(5, 2))
     numbers = acting(node, parent, None, memory)
     torch.testing.assert_close(numbers, trained(node, parent, None, memory)[..., :1])

@@ -22,6 +22,7 @@ def env_of(credit, sizes=(4,), task="random-walk", features="extended", seed=1, 
     usual = usual_settings(credit, mission, sizes)
     network = replace(usual.network, num_features=num_features(features))
     its = {"network": network, "features": features, "missions": MISSIONS, "groups": 4}
+    its["unknown_age"] = 0.0
     return GraphVecEnv(replace(usual, **(its | changes)), np.random.default_rng(seed))
 
 

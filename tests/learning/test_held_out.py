@@ -82,7 +82,7 @@ def test_several_missions_are_judged_by_the_mean_over_their_kinds():
 
 
 def test_evaluations_fly_with_the_bound_on_speech():
-    loud = replace(small_training(held_out=2), silence_logit=-50.0)
+    loud = replace(small_training(held_out=2), silence_logit=-50.0, most_speech=1.0)
     bounded = replace(loud, most_speech=1e-6)
     # Outside their turns robots now speak at every chance, or hardly ever.
     assert held_out_costs(bounded, NETWORK).packets_per_window < 1.1

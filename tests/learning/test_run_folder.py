@@ -43,10 +43,10 @@ def test_a_run_is_read_as_it_was_written(tmp_path, monkeypatch):
         assert read_run(tmp_path / "run") == run
 
 
-def test_runs_from_before_the_share_of_silent_rows_was_a_setting_go_on(tmp_path):
+def test_settings_of_before_packets_were_considered_have_the_usual_number(tmp_path):
     write_run(tmp_path, RUN)
     whole = json.loads((tmp_path / SETTINGS).read_text())
-    assert whole["training"]["ppo"].pop("silent_share") == 0.1
+    assert whole["training"]["ppo"].pop("considered") == 5.0
     (tmp_path / SETTINGS).write_text(json.dumps(whole))
     assert read_run(tmp_path) == RUN
 

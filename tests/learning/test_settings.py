@@ -29,7 +29,7 @@ def test_settings_are_read_by_their_former_names_and_without_fields_that_are_new
     stored["parts"] = stored.pop("components")
     stored["mission"]["switched_off"] = stored["mission"].pop("failure_fraction")
     stored["mission"]["known"] = stored["mission"].pop("prior_knowledge")
-    del stored["mission"]["map_offset_m"], stored["ppo"]["silent_share"]
+    del stored["mission"]["map_offset_m"], stored["ppo"]["considered"]
     assert read_json(json.dumps(stored), Training) == training
     del stored["robots"]
     with pytest.raises(ValueError, match="missing required field `robots`"):
@@ -69,9 +69,9 @@ def test_missions_of_training_have_at_most_the_windows_of_those_asked_for():
 
 def test_silence_is_dropped_only_where_it_earns_nothing():
     robot = usual_settings("robot", paper("stationary"), (40,))
-    assert robot.drops_silence == (robot.ppo.discount == 0.0)
-    assert not replace(robot, ppo=replace(robot.ppo, discount=0.5)).drops_silence
-    assert not small_training("team").drops_silence
+    assert robot.considers_speech == (robot.ppo.discount == 0.0)
+    assert not replace(robot, ppo=replace(robot.ppo, discount=0.5)).considers_speech
+    assert not small_training("team").considers_speech
 
 
 @pytest.mark.parametrize(

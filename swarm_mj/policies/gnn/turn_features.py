@@ -19,8 +19,9 @@ from swarm_mj.protocol.buffers import NEVER, NO_PARENT
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
-# How far apart robots are that are due at once, in `TurnNode`'s order [ranges].
-DISTANCES_APART = np.array([0.5, 0.7, 1.0, 1.5, 2.0, 3.0])
+# How far apart robots are that are due at once, in `TurnNode`'s order [ranges]. The shortest are
+# for ranges as wide as the area, where the nearest of many senders is decoded.
+DISTANCES_APART = np.array([0.15, 0.25, 0.35, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0])
 MOST_HOPS = 10  # counted; parents of news from different times may lead in a circle
 MANY_HOPS = 5.0  # that count as 1
 
@@ -42,12 +43,16 @@ class TurnNode:
     is_direct: Annotated[float, Feature("P is oneself")]
     velocity_x: Annotated[float, Feature("v_x")]
     velocity_y: Annotated[float, Feature("v_y")]
+    nearness: Annotated[float, Feature("rank by distance")]  # 0: oneself
     is_staler: Annotated[float, Feature("is staler")]  # comes before oneself
     # 0: the stalest; of oneself by its own last packet
     rank: Annotated[float, Feature("rank by T")]
     is_answered: Annotated[float, Feature("T is not from before L")]  # heard of since addressed
     behind: Annotated[float, Feature("teammates behind it in the tree of P")]
     hops: Annotated[float, Feature("hops in the tree of P")]
+    due_015: Annotated[float, Feature("is due within 0.15 ranges")]
+    due_025: Annotated[float, Feature("is due within 0.25 ranges")]
+    due_035: Annotated[float, Feature("is due within 0.35 ranges")]
     due_05: Annotated[float, Feature("is due within 0.5 ranges")]
     due_07: Annotated[float, Feature("is due within 0.7 ranges")]
     due_1: Annotated[float, Feature("is due within 1 range")]
@@ -61,9 +66,18 @@ class TurnNode:
     staler_1: Annotated[float, Feature("staler robots within 1 range")]
     staler_2: Annotated[float, Feature("staler robots within 2 ranges")]
     staler: Annotated[float, Feature("staler robots")]
+    # These know no range: how many share the air depends on how close they are.
+    staler_of_3: Annotated[float, Feature("staler robots among the nearest 3")]
+    staler_of_6: Annotated[float, Feature("staler robots among the nearest 6")]
+    staler_of_12: Annotated[float, Feature("staler robots among the nearest 12")]
+    staler_of_24: Annotated[float, Feature("staler robots among the nearest 24")]
     own_age: Annotated[float, Feature("since the robot last spoke first")]
     is_own_answered: Annotated[float, Feature("its last packet was answered")]
     oldest_age: Annotated[float, Feature("greatest age of T")]
+    newest_age: Annotated[float, Feature("least age of T")]  # grows while nobody gets through
+    own_due_015: Annotated[float, Feature("is itself due within 0.15 ranges")]
+    own_due_025: Annotated[float, Feature("is itself due within 0.25 ranges")]
+    own_due_035: Annotated[float, Feature("is itself due within 0.35 ranges")]
     own_due_05: Annotated[float, Feature("is itself due within 0.5 ranges")]
     own_due_07: Annotated[float, Feature("is itself due within 0.7 ranges")]
     own_due_1: Annotated[float, Feature("is itself due within 1 range")]
@@ -90,7 +104,9 @@ class Known(NamedTuple):
     since_of: Float[np.ndarray, "N"]  # T of robot k; of oneself its last packet [windows]
     x_of: Float[np.ndarray, "N"]  # x of robot k
     y_of: Float[np.ndarray, "N"]
+    nearer: Int[np.ndarray, "N"]  # how many of them are nearer
     gap: Float[np.ndarray, "N"]  # to the nearest that is due, squared; room for `_write_due`
+    by_distance: Int[np.ndarray, "N"]  # room for `_rank_by_distance`
 
 
 class Tree(NamedTuple):
@@ -156,7 +172,9 @@ def _write_nodes(
         since_of=np.empty(num_robots),
         x_of=np.empty(num_robots),
         y_of=np.empty(num_robots),
+        nearer=np.empty(num_robots, np.int64),
         gap=np.empty(num_robots),
+        by_distance=np.empty(num_robots, np.int64),
     )
     tree = Tree(behind=np.empty(num_robots, np.int64), hops=np.empty(num_robots, np.int64))
     is_due = np.empty((len(DISTANCES_APART), num_robots), np.bool_)
@@ -174,6 +192,7 @@ def _write_nodes(
                 spoke=_last_spoken(last_attempt[b, i], i),
             )
             num_known = _sort_known(own, i, 1.0 / range_m, known)
+            _rank_by_distance(known, num_known)
             for level in range(len(DISTANCES_APART)):
                 _write_due(known, num_known, DISTANCES_APART[level], is_due[level])
             _follow_parents(own, i, tree)
@@ -214,6 +233,21 @@ def _sort_known(own: OwnBuffer, i: int, per_m: float, known: Known) -> int:
         known.x[place] = known.x_of[known.robot[place]]
         known.y[place] = known.y_of[known.robot[place]]
     return num_known
+
+
+@compiled(forceinline=True, makes_arrays=False)
+def _rank_by_distance(known: Known, num_known: int) -> None:
+    """Write how many of the robots that are known are nearer than each, the staler if as near."""
+    apart = known.gap
+    for place in range(num_known):
+        apart[place] = known.x[place] ** 2 + known.y[place] ** 2
+        rank = place  # an insertion sort, again
+        while rank > 0 and apart[place] < apart[known.by_distance[rank - 1]]:
+            known.by_distance[rank] = known.by_distance[rank - 1]
+            rank -= 1
+        known.by_distance[rank] = place
+    for rank in range(num_known):
+        known.nearer[known.by_distance[rank]] = rank
 
 
 @compiled(makes_arrays=False)
@@ -307,18 +341,23 @@ def _write_counts(
         unknown: TurnNode = its[k]
         unknown.is_staler = 0.0
         unknown.rank = shares[num_known]  # last, and together
+        unknown.nearness = shares[num_known]
     within_025 = within_05 = within_1 = within_2 = near = 0
+    of_3 = of_6 = of_12 = of_24 = 0
     staler = num_known
     oldest = now
+    newest = NEVER
     for place in range(num_known):
         k = int(known.robot[place])
         of_k: TurnNode = its[k]
         of_k.rank = shares[place]
+        of_k.nearness = shares[int(known.nearer[place])]
         if k == i:
             staler = place
             continue
         near += of_k.is_near > 0.0
         oldest = min(oldest, known.since_of[k])
+        newest = max(newest, known.since_of[k])
         if place < staler:
             of_k.is_staler = 1.0
             ranges = np.sqrt(known.x[place] ** 2 + known.y[place] ** 2)
@@ -326,12 +365,17 @@ def _write_counts(
             within_05 += ranges <= 0.5
             within_1 += ranges <= 1.0
             within_2 += ranges <= 2.0
+            of_3 += known.nearer[place] <= 3
+            of_6 += known.nearer[place] <= 6
+            of_12 += known.nearer[place] <= 12
+            of_24 += known.nearer[place] <= 24
     is_answered = False
     for k in range(num_robots):
         is_last = own.spoke > NEVER and own.last_attempt[k] == own.spoke
         is_answered |= is_last and k != i and own.timestamp[k] >= own.spoke
     own_age = log_age(now, own.spoke)
     oldest_age = log_age(now, oldest, True)
+    newest_age = log_age(now, newest)
     for k in range(num_robots):
         of_each: TurnNode = its[k]
         of_each.unknown = shares[num_robots - num_known]
@@ -341,9 +385,14 @@ def _write_counts(
         of_each.staler_1 = shares[within_1]
         of_each.staler_2 = shares[within_2]
         of_each.staler = shares[staler]
+        of_each.staler_of_3 = shares[of_3]
+        of_each.staler_of_6 = shares[of_6]
+        of_each.staler_of_12 = shares[of_12]
+        of_each.staler_of_24 = shares[of_24]
         of_each.own_age = own_age
         of_each.is_own_answered = is_answered
         of_each.oldest_age = oldest_age
+        of_each.newest_age = newest_age
 
 
 @compiled(forceinline=True, makes_arrays=False)
@@ -358,12 +407,15 @@ def _write_place(
     """Write where k stands in the tree of P, and in the turns; and the robot's own turns."""
     node.behind = shares[int(tree.behind[k])]
     node.hops = tree.hops[k] / MANY_HOPS
-    node.due_05, node.own_due_05 = is_due[0, k], is_due[0, i]
-    node.due_07, node.own_due_07 = is_due[1, k], is_due[1, i]
-    node.due_1, node.own_due_1 = is_due[2, k], is_due[2, i]
-    node.due_15, node.own_due_15 = is_due[3, k], is_due[3, i]
-    node.due_2, node.own_due_2 = is_due[4, k], is_due[4, i]
-    node.due_3, node.own_due_3 = is_due[5, k], is_due[5, i]
+    node.due_015, node.own_due_015 = is_due[0, k], is_due[0, i]
+    node.due_025, node.own_due_025 = is_due[1, k], is_due[1, i]
+    node.due_035, node.own_due_035 = is_due[2, k], is_due[2, i]
+    node.due_05, node.own_due_05 = is_due[3, k], is_due[3, i]
+    node.due_07, node.own_due_07 = is_due[4, k], is_due[4, i]
+    node.due_1, node.own_due_1 = is_due[5, k], is_due[5, i]
+    node.due_15, node.own_due_15 = is_due[6, k], is_due[6, i]
+    node.due_2, node.own_due_2 = is_due[7, k], is_due[7, i]
+    node.due_3, node.own_due_3 = is_due[8, k], is_due[8, i]
 
 
 @compiled(forceinline=True, makes_arrays=False)

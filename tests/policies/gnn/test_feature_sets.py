@@ -28,7 +28,7 @@ from swarm_mj.policies.gnn.turn_features import TurnFeatures
         ("paper", PaperFeatures, 1 + 1 + 1 + 2 + 2 + 1),  # two flags, T, p, v, L (III-A)
         ("reference", ReferenceFeatures, 7),
         ("buffer", BufferFeatures, 21),
-        ("turns", TurnFeatures, 38),
+        ("turns", TurnFeatures, 50),
         ("local", LocalFeatures, 18 - 5),  # without the turns agreed beforehand
         ("extended", ExtendedFeatures, 18),
     ],

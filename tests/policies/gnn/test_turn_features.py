@@ -16,19 +16,25 @@ from swarm_mj.simulation.swarm import Swarm
 
 NOW = 10.0
 OBSERVER = 1  # the robot whose row is looked at
-APART = {"0.5 ranges": 0.5, "0.7 ranges": 0.7, "1 range": 1.0, "1.5 ranges": 1.5, "2 ranges": 2.0,
-         "3 ranges": 3.0}  # fmt: skip
+APART = {
+    **{"0.15 ranges": 0.15, "0.25 ranges": 0.25, "0.35 ranges": 0.35, "0.5 ranges": 0.5},
+    **{"0.7 ranges": 0.7, "1 range": 1.0, "1.5 ranges": 1.5, "2 ranges": 2.0, "3 ranges": 3.0},
+}
+NEAREST = (3, 6, 12, 24)
 # As stored policies know them, in their order, and none of the code under test: two features that
 # change places are both wrong.
 NAMES = (
     *("is oneself", "is known", "age of T", "age of L", "x, in ranges", "y, in ranges", "distance"),
-    *("is in range", "P is oneself", "v_x", "v_y", "is staler", "rank by T"),
+    *("is in range", "P is oneself", "v_x", "v_y", "rank by distance"),
+    *("is staler", "rank by T"),
     *("T is not from before L", "teammates behind it in the tree of P", "hops in the tree of P"),
     *(f"is due within {each}" for each in APART),
     *("teammates unknown", "neighbours", "staler robots within 0.25 ranges"),
     *("staler robots within 0.5 ranges", "staler robots within 1 range"),
-    *("staler robots within 2 ranges", "staler robots", "since the robot last spoke first"),
-    *("its last packet was answered", "greatest age of T"),
+    *("staler robots within 2 ranges", "staler robots"),
+    *(f"staler robots among the nearest {number}" for number in NEAREST),
+    *("since the robot last spoke first", "its last packet was answered", "greatest age of T"),
+    "least age of T",
     *(f"is itself due within {each}" for each in APART),
 )
 
@@ -93,12 +99,14 @@ def test_states_and_ages():
             "P is oneself": [1, 0, 0, 0, 0],
             "v_x": [2 / 3, 0, 0, 0, 0],
             "v_y": [-1, 0, 0, 0, 0.5],
+            "rank by distance": [log_count(n) for n in (1, 0, 4, 3, 2)],
             "T is not from before L": [0, 0, 0, 1, 0],
             "teammates unknown": [log_count(1)] * 5,
             "neighbours": [0.2] * 5,
             "since the robot last spoke first": [log_age(2)] * 5,
             "its last packet was answered": [0] * 5,
             "greatest age of T": [log_age(6)] * 5,
+            "least age of T": [log_age(1)] * 5,
         },
     )
     assert graphs.may_address[OBSERVER].tolist() == [True, True, True, False, True]
@@ -157,6 +165,7 @@ def test_who_has_been_silent_for_longer():
             "staler robots within 1 range": [one] * 5,
             "staler robots within 2 ranges": [one] * 5,
             "staler robots": [one] * 5,
+            **{f"staler robots among the nearest {number}": [one] * 5 for number in NEAREST},
         },
     )
 
@@ -170,20 +179,43 @@ def test_staler_robots_count_by_their_distance(ranges, counts):
     buffers = buffers_of_robot_1()
     buffers.position_m[0, OBSERVER, 0] = [100.0, 250.0 * ranges]
     found, _ = seen(buffers)
-    for name, count in zip(NAMES[24:29], counts, strict=True):
+    first = NAMES.index("staler robots within 0.25 ranges")
+    for name, count in zip(NAMES[first : first + 5], counts, strict=True):
         assert found[name][OBSERVER] == pytest.approx(log_count(count)), name
+
+
+def test_staler_robots_count_by_how_many_are_nearer():
+    """In a row to the right, the stalest the farthest; oneself, who spoke at 8, is the freshest."""
+    buffers = empty_buffers(1, 30)
+    buffers.timestamp[0, OBSERVER] = np.linspace(7.0, 1.0, 30)
+    buffers.last_attempt[0, OBSERVER, 0] = 8.0
+    buffers.position_m[0, OBSERVER, :, 0] = 10.0 * np.arange(30)
+    buffers.position_m[0, OBSERVER, OBSERVER, 0] = -10.0
+    buffers.timestamp[0, OBSERVER, [0, 3]] = 9.0  # the nearest, and the third: not staler
+    found, _ = seen(buffers)
+    counts = [found[f"staler robots among the nearest {number}"][OBSERVER] for number in NEAREST]
+    assert counts == pytest.approx([log_count(n) for n in (1, 4, 10, 22)])
+
+
+def test_who_is_as_near_ranks_by_staleness():
+    buffers = empty_buffers(1, 3)
+    buffers.timestamp[0, OBSERVER] = [5.0, NOW, 4.0]
+    buffers.position_m[0, OBSERVER, :, 0] = [0.0, 50.0, 100.0]
+    found, _ = seen(buffers)
+    assert found["rank by distance"].tolist() == pytest.approx([log_count(n) for n in (2, 0, 1)])
 
 
 def test_who_is_due_is_far_enough_from_the_staler_ones_that_are():
     """Robots by staleness: 0, then 1 itself (0.2 ranges off), 4 and 3; 2 is unknown.
 
-    Robot 0 always is. Robot 1 is too near to it. Robot 4 is sqrt(0.2² + 0.4²) = 0.45 off it, robot
-    3 sqrt(1.04² + 1.12²) = 1.53.
+    Robot 0 always is. Robot 1 is too near to it but at the first level. Robot 4 is sqrt(0.2² +
+    0.4²) = 0.45 off it and 0.4 off robot 1; robot 3 sqrt(1.04² + 1.12²) = 1.53 off robot 0.
     """
     found, _ = seen(buffers_of_robot_1())
     for name, apart in APART.items():
-        assert found[f"is due within {name}"].tolist() == [1, 0, 0, apart <= 1.5, 0], name
-        assert found[f"is itself due within {name}"].tolist() == [0] * 5, name
+        due = [1, apart <= 0.2, 0, apart <= 1.5, apart <= 0.4]
+        assert found[f"is due within {name}"].tolist() == due, name
+        assert found[f"is itself due within {name}"].tolist() == [apart <= 0.2] * 5, name
 
 
 def test_who_is_not_due_keeps_nobody_from_being():
@@ -193,12 +225,13 @@ def test_who_is_not_due_keeps_nobody_from_being():
     buffers.position_m[0, OBSERVER, :, 0] = [0.0, 150.0, 0.0, 450.0, 300.0]
     found, _ = seen(buffers)  # 0 (stalest), 1, 4, 3 from left to right
     due = {name: found[f"is due within {name}"].tolist() for name in APART}
-    assert due["0.5 ranges"] == [1, 1, 0, 1, 1]
+    for name in ("0.15 ranges", "0.25 ranges", "0.35 ranges", "0.5 ranges"):
+        assert due[name] == [1, 1, 0, 1, 1]
     assert due["0.7 ranges"] == due["1 range"] == [1, 0, 0, 0, 1]
     assert due["1.5 ranges"] == [1, 0, 0, 1, 0]
     assert due["2 ranges"] == due["3 ranges"] == [1, 0, 0, 0, 0]
     own = [found[f"is itself due within {name}"].tolist() for name in APART]
-    assert own == [[1] * 5, *[[0] * 5] * 5]
+    assert own == [*[[1] * 5] * 4, *[[0] * 5] * 5]
 
 
 @pytest.mark.parametrize(("first_x", "due"), [(99.0, [1, 0]), (101.0, [0, 1])])
@@ -290,6 +323,11 @@ def _plain_graph(buffers, mission, b, i, now):
     def count_staler(radius):
         return log_count(sum(ranges[k] <= radius for k in staler))
 
+    nearest = sorted(order, key=lambda k: ranges[k])
+
+    def count_staler_of(number):
+        return log_count(sum(k in staler for k in nearest[: number + 1]))
+
     answered = any(attempt[k] == spoke > NEVER and t[k] >= spoke for k in others)
     shared = {
         "teammates unknown": log_count(num_robots - len(known)),
@@ -299,9 +337,11 @@ def _plain_graph(buffers, mission, b, i, now):
         "staler robots within 1 range": count_staler(1.0),
         "staler robots within 2 ranges": count_staler(2.0),
         "staler robots": log_count(len(staler)),
+        **{f"staler robots among the nearest {each}": count_staler_of(each) for each in NEAREST},
         "since the robot last spoke first": age(spoke),
         "its last packet was answered": answered,
         "greatest age of T": age(min([now, *(t[k] for k in known - {i})]), True),
+        "least age of T": age(max([NEVER, *(t[k] for k in known - {i})])),
         **{f"is itself due within {name}": i in its for name, its in due.items()},
     }
     nodes = []
@@ -319,6 +359,7 @@ def _plain_graph(buffers, mission, b, i, now):
             "P is oneself": k != i and parent[k] == i,
             "v_x": speed[k, 0] if is_known else 0.0,
             "v_y": speed[k, 1] if is_known else 0.0,
+            "rank by distance": log_count(nearest.index(k) if is_known else len(known)),
             "is staler": k in staler,
             "rank by T": log_count(order.index(k) if is_known else len(known)),
             "T is not from before L": k != i and NEVER < attempt[k] <= t[k],
