@@ -28,7 +28,7 @@ from swarm_mj.policies.gnn.network import Network
 from swarm_mj.system.reading import open_file, read_json, read_plain
 from swarm_mj.system.writing import write_bytes
 
-CHECKPOINT_VERSION = 5  # that of 1.0.0
+CHECKPOINT_VERSION = 6
 MOMENTS = ("mean", "var", "count")  # of `VecNormalize`'s returns
 
 Networks = dict[int, Network]  # of policies that may be kept, by their decisions
@@ -99,7 +99,7 @@ def load(path: Path, training: Training, model: PPO) -> tuple[Progress, Networks
             raise ValueError("another version of swarm_mj wrote it, which can go on with it")
         if read_json(state["training"], Training) != training:
             raise ValueError("it was made with other settings than the run's")
-        trained_on = tuple(state.get("feature_names", ()))  # none in those of 1.0.0
+        trained_on = tuple(state["feature_names"])
     check_unchanged(training.features, trained_on, f"checkpoint {path}")
     with as_damaged(path):
         return restore(state, model)

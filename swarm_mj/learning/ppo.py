@@ -50,6 +50,16 @@ class DevicePpo(PPO):
             optimizer.load_state_dict(optimizer.state_dict())  # Adam's moments follow the weights
 
 
+def mean_entropy(model: PPO) -> float:
+    """Return the entropy of the decisions of a rollout, a mean over all of its rows [nats].
+
+    A decision's negative log-probability has the entropy for its mean.
+    """
+    buffer = model.rollout_buffer
+    is_of_speech = isinstance(buffer, SpeechRolloutBuffer)
+    return -float((buffer.done_log_probs if is_of_speech else buffer.log_probs).mean())
+
+
 def optimising_device(device: Device) -> torch.device:
     """Return where networks are optimised; raise ValueError if this machine has no such device."""
     has_cuda = torch.cuda.is_available()
@@ -142,6 +152,7 @@ class Considered(NamedTuple):
 
     recipient: Int[Tensor, "E"]  # the one addressed, if the robot speaks; itself: none considered
     weight: Float[Tensor, "E"]  # of its credit, so that rows' chances to be considered cancel
+    log_p: Float[Tensor, "E"]  # log-probability of what the robot did in fact
 
 
 class GnnActorCritic(ActorCriticPolicy):
@@ -323,7 +334,8 @@ def consider(
     is_extra = (torch.rand(len(q)) < extra) & (actions == own)
     recipient = torch.where(is_extra, draw(speech), actions)
     weight = (per_packet * q).clamp(min=1.0)
-    return Considered(recipient=recipient, weight=weight.float())
+    done = log_p.gather(1, actions[:, None]).squeeze(1)
+    return Considered(recipient=recipient, weight=weight.float(), log_p=done.float())
 
 
 def log_probability(
@@ -353,6 +365,8 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
 
     Attributes:
         considers: Asks for what is considered in the window that is added.
+        weights: Those of credits, by window and row.
+        done_log_probs: Log-probabilities of what robots did, likewise.
     """
 
     considers: Callable[[], Considered]
@@ -361,6 +375,7 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
         """Begin a rollout."""
         super().reset()
         self.weights = np.ones_like(self.rewards)
+        self.done_log_probs = np.zeros_like(self.rewards)
 
     def add(
         self,
@@ -372,9 +387,10 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
         log_prob: Tensor,
     ) -> None:
         """Add a window, as the base does, with what is considered in place of what was done."""
-        recipient, weight = self.considers()
-        self.weights[self.pos] = weight.numpy()
-        action = recipient.numpy()[:, None]
+        considered = self.considers()
+        self.weights[self.pos] = considered.weight.numpy()
+        self.done_log_probs[self.pos] = considered.log_p.numpy()
+        action = considered.recipient.numpy()[:, None]
         super().add(obs, action, reward, episode_start, value, log_prob)
 
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:

@@ -16,7 +16,7 @@ from swarm_mj.learning.held_out import Acting
 from swarm_mj.learning.index_session import IndexSession
 from swarm_mj.learning.live import LiveTraining
 from swarm_mj.learning.loggers import Guarded, Logger
-from swarm_mj.learning.ppo import make_model, policy_of
+from swarm_mj.learning.ppo import make_model, mean_entropy, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Listener, Progress
 from swarm_mj.learning.session import Session, record_evaluation
@@ -96,10 +96,8 @@ class TrainingSession(Session, BaseCallback):
         return True
 
     def _on_rollout_end(self) -> None:
-        # PPO's own mean is over the rows it learns from; over all rows, a decision's negative
-        # log-probability has the entropy for its mean.
-        log_p = self.ppo.rollout_buffer.log_probs
-        self.logger.record("train/entropy", -float(log_p.mean()))
+        # PPO's own mean is over the rows it learns from.
+        self.logger.record("train/entropy", mean_entropy(self.ppo))
 
     def _between_steps(self, *, is_last: bool) -> None:
         """Check the weights, then do what is due."""

@@ -14,7 +14,14 @@ from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import Considered, SpeechRolloutBuffer, consider, make_model
+from swarm_mj.learning.ppo import (
+    Considered,
+    SpeechRolloutBuffer,
+    consider,
+    entropy,
+    make_model,
+    mean_entropy,
+)
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import PRESETS
 from swarm_mj.policies.learned import IMPOSSIBLE
@@ -31,8 +38,8 @@ GIVEN = {
     ("team", "reference"): {**TEAM, "batch_size": 32, "vf_coef": 0.25},
     # Credit per robot is the package's own: 16 missions of 5 robots, credits as they are.
     ("robot", "paper"): {
-        **{"learning_rate": 1e-3, "n_envs": 16 * 5, "n_steps": 16, "batch_size": 16 * 5 * 16 // 10},
-        **{"n_epochs": 3, "gamma": 0.0, "gae_lambda": 0.9, "clip_range": 0.2},
+        **{"learning_rate": 1e-3, "n_envs": 16 * 5, "n_steps": 32, "batch_size": 16 * 5 * 32 // 10},
+        **{"n_epochs": 2, "gamma": 0.0, "gae_lambda": 0.9, "clip_range": 0.2},
         **{"clip_range_vf": None, "ent_coef": 0.002, "vf_coef": 0.5, "max_grad_norm": 0.5},
         "normalize_advantage": False,
     },
@@ -64,8 +71,8 @@ def test_ppo_is_given_the_papers_numbers_and_the_authors(credit, preset):
         # 2 minibatches a pass under `paper`, 4 under `reference`; 0.95 every 5000 of them.
         ("team", "paper", {0: 1e-4, 2499: 1e-4, 2500: 0.95e-4, 5000: 0.9025e-4, 10**6: 0.0}),
         ("team", "reference", {0: 1e-4, 1249: 1e-4, 1250: 0.95e-4, 2500: 0.9025e-4, 10**6: 0.0}),
-        # 10 minibatches a pass; 0.95 every 300 of them, but never below 3 hundredths.
-        ("robot", "paper", {0: 1e-3, 29: 1e-3, 30: 0.95e-3, 60: 0.9025e-3, 10**6: 3e-5}),
+        # 10 minibatches a pass; 0.95 every 100 of them, but never below 3 hundredths.
+        ("robot", "paper", {0: 1e-3, 9: 1e-3, 10: 0.95e-3, 20: 0.9025e-3, 10**6: 3e-5}),
     ],
 )
 def test_the_presets_rates_decay_as_the_authors_do(credit, preset, rates):
@@ -210,7 +217,7 @@ def assert_share(events, expected):
 )
 def test_packets_are_considered_as_often_as_asked_and_weigh_what_that_leaves(q, per_packet, share):
     """The gradient's expectation is that of all rows: chance times weight is in proportion to q."""
-    actions, (recipient, weight) = considered(q, per_packet)
+    actions, (recipient, weight, log_p) = considered(q, per_packet)
     speaks = actions != 3
     assert torch.equal(recipient[speaks], actions[speaks])
     assert_share(recipient != 3, share)
@@ -220,12 +227,14 @@ def test_packets_are_considered_as_often_as_asked_and_weigh_what_that_leaves(q, 
         only = recipient[~speaks]
         assert_share(only[only != 3] == 0, 0.75)
     assert not torch.any(recipient == 2)
+    done = torch.tensor([0.75 * q, 0.25 * q, 0.0, 1.0 - q]).log()[actions]
+    torch.testing.assert_close(log_p, done, atol=1e-5, rtol=1e-4)
 
 
 def test_who_never_speaks_considers_nothing():
     """To within what 32 bits tell from certainty."""
     logits = torch.tensor([[-80.0, 0.0], [IMPOSSIBLE, 0.0]])
-    recipient, weight = consider(logits, torch.tensor([1, 1]), torch.tensor([1, 1]), 5.0)
+    recipient, weight, _ = consider(logits, torch.tensor([1, 1]), torch.tensor([1, 1]), 5.0)
     assert recipient.tolist() == [1, 1]
     assert torch.isfinite(weight).all()
 
@@ -246,7 +255,8 @@ def filled(speaks):
         number = np.arange(step * ROWS, (step + 1) * ROWS, dtype=np.float32)
         recipient = np.where(speaks[step], (owner[:, 0] + 1) % ROBOTS, owner[:, 0])
         weight = torch.full((ROWS,), 2.0 if step < STEPS // 2 else 3.0)
-        its = Considered(recipient=torch.from_numpy(recipient), weight=weight)
+        done = torch.full((ROWS,), -float(step))
+        its = Considered(recipient=torch.from_numpy(recipient), weight=weight, log_p=done)
         buffer.considers = lambda its=its: its
         seen, zeros = {"owner": owner, "number": number[:, None]}, torch.zeros(ROWS)
         buffer.add(seen, owner, number, np.zeros(ROWS), zeros, zeros)
@@ -295,6 +305,25 @@ def test_minibatches_are_as_many_as_of_all_rows_and_none_is_empty(speaks):
     few = np.zeros((STEPS, ROWS), dtype=bool)
     few[0, 0] = True
     assert [len(batch.advantages) for batch in filled(few).get(1)] == [1]
+
+
+@pytest.mark.parametrize("credit", ["robot", "team"])
+def test_the_entropy_logged_is_that_of_decisions(credit):
+    """Not of packets that are only considered."""
+    model = make_model(small_training(credit, silence_logit=3.0))
+    found = []
+    forward = model.policy.forward
+
+    def watched(observation, *given):
+        logits, _ = model.policy.logits_and_value(observation)
+        found.append(entropy(logits).mean().item())
+        return forward(observation, *given)
+
+    model.policy.forward = watched
+    model.train = lambda: None
+    model.learn(model.n_steps * model.n_envs)
+    rows = model.n_steps * model.n_envs
+    assert mean_entropy(model) == pytest.approx(np.mean(found), abs=4.0 / np.sqrt(rows))
 
 
 @pytest.mark.parametrize("share", [1.0, 5.0])
