@@ -14,7 +14,7 @@ from stable_baselines3.common.policies import ActorCriticPolicy
 from stable_baselines3.common.type_aliases import DictRolloutBufferSamples, PyTorchObs, Schedule
 from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import Tensor
-from torch.optim.swa_utils import AveragedModel, get_ema_multi_avg_fn
+from torch.optim.swa_utils import AveragedModel
 
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import Device, PpoSettings, Training
@@ -183,13 +183,20 @@ class GnnActorCritic(ActorCriticPolicy):
             self.parameters(), lr=lr_schedule(1.0), foreach=True, **self.optimizer_kwargs
         )
         # What flies: the weights of late differ from one rollout to the next more than they learn.
-        kept = self._training.ppo.kept
-        self.average = AveragedModel(self.network, multi_avg_fn=get_ema_multi_avg_fn(kept))
+        self.average = AveragedModel(self.network, multi_avg_fn=self._take_into_average)
         self.average.requires_grad_(False)
 
     def take_average(self) -> None:
         """Take the network's weights as they now are into the average."""
         self.average.update_parameters(self.network)
+
+    def _take_into_average(
+        self, averaged: list[Tensor], current: list[Tensor], num_averaged: Tensor
+    ) -> None:
+        # At first a network learns fast, and its weights of long ago are soon worth nothing.
+        num = int(num_averaged)
+        kept = min(self._training.ppo.kept, (1.0 + num) / (10.0 + num))
+        torch._foreach_lerp_(averaged, current, 1.0 - kept)
 
     def considered(self) -> Considered:
         """Return the packets considered in the last decision."""

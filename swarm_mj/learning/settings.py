@@ -79,10 +79,10 @@ class PpoSettings:
         high=1.0,
     )
     decay: float = setting(0.95, low=0.0, high=1.0)  # of the learning rate ...
-    decay_steps: int = setting(100, low=1, high=10**9)  # ... in this many optimiser steps ...
+    decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
     least_share: float = setting(0.03, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(
-        32,
+        8,
         "windows of each mission in a rollout",
         label="rollout",
         flag="--rollout-windows",
@@ -90,7 +90,7 @@ class PpoSettings:
         high=100_000,
     )
     num_minibatches: int = setting(
-        10, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
+        5, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
     )
     num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
     discount: float = setting(

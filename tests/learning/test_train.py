@@ -5,11 +5,13 @@ import itertools
 import time
 from dataclasses import replace
 
+import numpy as np
 import pytest
 from small_runs import StopAfter, difference, run, small_training
 from tensorboard.backend.event_processing.event_accumulator import EventAccumulator
 from tiny_policies import save_tiny
 
+from swarm_mj import evaluate
 from swarm_mj.learning import held_out, selection, train
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -21,7 +23,8 @@ from swarm_mj.learning.run_folder import (
     Limits,
     TrainingRun,
 )
-from swarm_mj.learning.settings import HELD_OUT_SEED, TEST_SEED
+from swarm_mj.learning.settings import HELD_OUT_SEED, TEST_SEED, usual_settings
+from swarm_mj.mission import paper
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.policies.stored import POLICY, read_policy
 from swarm_mj.replay.read import windows
@@ -305,3 +308,18 @@ def test_a_run_that_appears_meanwhile_is_not_continued(tmp_path, monkeypatch):
     monkeypatch.setattr(train, "owned", owned_late)
     with pytest.raises(ValueError, match=r"holds checkpoint.pt; go on with a run by --resume"):
         run(small_training(), tmp_path)
+
+
+@pytest.mark.slow
+def test_a_minute_of_training_by_the_usual_settings_beats_random_flooding(tmp_path):
+    """On missions that neither has seen, mission by mission; tails count, too."""
+    mission = paper("stationary", num_robots=20)
+    usual = usual_settings("robot", mission, (20,), seed=1)
+    run(replace(usual, held_out=2, evaluate_every=6000), tmp_path, decisions=6000)
+    flown = evaluate(
+        [str(tmp_path), "random-flooding"], num_robots=20, num_missions=20, seed=4_700_000
+    )
+    trained, flooding = (np.array(result.aoi) for result in flown.results)
+    gain = flooding - trained
+    assert gain.mean() > 3.0 * gain.std(ddof=1) / np.sqrt(20)
+    assert trained.max() < flooding.max()
