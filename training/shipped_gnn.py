@@ -31,7 +31,7 @@ REGIMES = {
     "walks": "--task random-walk --robots 10 40 80",
     "flocks": "--task flocking",
 }
-TRAINING = "--entropy 0.01 --evaluate-every 25000 --seed 1"
+TRAINING = "--features extended --entropy 0.01 --evaluate-every 25000 --seed 1"
 FIRST_SEED = 3000  # of the comparison: neither the training's nor the final evaluation's
 MOST_BYTES = 10_000_000  # of a curve
 

@@ -183,20 +183,18 @@ class GnnActorCritic(ActorCriticPolicy):
             self.parameters(), lr=lr_schedule(1.0), foreach=True, **self.optimizer_kwargs
         )
         # What flies: the weights of late differ from one rollout to the next more than they learn.
-        self.average = AveragedModel(self.network, multi_avg_fn=self._take_into_average)
+        self.average = AveragedModel(self.network, avg_fn=self._averaged)
         self.average.requires_grad_(False)
 
     def take_average(self) -> None:
         """Take the network's weights as they now are into the average."""
         self.average.update_parameters(self.network)
 
-    def _take_into_average(
-        self, averaged: list[Tensor], current: list[Tensor], num_averaged: Tensor
-    ) -> None:
+    def _averaged(self, average: Tensor, current: Tensor, num_averaged: Tensor | int) -> Tensor:
         # At first a network learns fast, and its weights of long ago are soon worth nothing.
         num = int(num_averaged)
         kept = min(self._training.ppo.kept, (1.0 + num) / (10.0 + num))
-        torch._foreach_lerp_(averaged, current, 1.0 - kept)
+        return average.lerp(current, 1.0 - kept)
 
     def considered(self) -> Considered:
         """Return the packets considered in the last decision."""
