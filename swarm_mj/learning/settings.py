@@ -17,7 +17,7 @@ from swarm_mj.protocol.mission_costs import (
     Reward,
 )
 from swarm_mj.simulation.components import Components
-from swarm_mj.system.fields import check, check_value, common_setting, setting
+from swarm_mj.system.fields import as_typed, check, check_value, common_setting, setting
 from swarm_mj.system.user_code import files_named
 
 TrainedPolicy = Literal["gnn", "index-csma"]  # a network, by PPO; an index, by evolution
@@ -31,8 +31,10 @@ HELD_OUT_SEED = 500_000  # of evaluations during training
 CHOICE_SEED = 510_000  # of those that choose a policy
 TEST_SEED = 520_000  # of those that tell its cost
 EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as speech
+USUAL_SILENCE = 5.5  # training begins with one of 40 robots in seven speaking
 # Where an order of turns lets a robot speak, the others begin all but silent.
 ORDERLY_SILENCE = 7.0
+TRAIN_WINDOWS = (40, 250)  # long missions and short ones should end well alike
 # A generation is thousands of decisions, so an evaluation every 10,000 would follow each of them.
 INDEX_EVALUATED_EVERY = 200_000
 MAX_ROBOTS = 200  # a team decision takes robots² nodes
@@ -246,12 +248,11 @@ class Training:
     )
     network: GnnShape = ROBOTS_NETWORK  # that acts
     shares_trunk: bool = True  # whether values are one more output of the same network
-    # Added to the logit of silence, except in a robot's own turn: training begins with one of 40
-    # robots in seven speaking.
+    # Added to the logit of silence, except in a robot's own turn.
     silence_logit: float = setting(
-        5.5,
+        USUAL_SILENCE,
         "bias towards silence, outside a robot's turn",
-        shown=f"5.5, extended: {ORDERLY_SILENCE:g}, team: the preset's own",
+        shown=f"{USUAL_SILENCE:g}, extended: {ORDERLY_SILENCE:g}, team: the preset's own",
         low=-100.0,
         high=100.0,
     )
@@ -294,13 +295,13 @@ class Training:
     )
     # The first windows are the hardest: who begins more often practises them more.
     train_windows: tuple[int, ...] = setting(
-        (40, 250),
+        TRAIN_WINDOWS,
         "windows after which missions in training begin anew, if they have more; of two, the least "
         "and the most of a number drawn for each; evaluations fly all of --windows",
         label="train-windows",
         low=1,
         high=MAX_DECISIONS,
-        shown="40 250, team and index-csma: --windows",
+        shown=f"{as_typed(TRAIN_WINDOWS)}, team and index-csma: --windows",
     )
     groups: int = setting(4, low=1, high=4096)  # of missions that end at different times
     seed: int = common_setting(0, "the same seed is the same policy", low=0, high=MAX_SEED)
