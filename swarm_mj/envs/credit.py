@@ -4,11 +4,14 @@ The difference reward of Wolpert and Tumer (2001): the window is replayed withou
 the same channel and by the same protocol. Its sum has the gradient of the team's gain, and a silent
 robot's credit is 0. Replayed with a packet that a silent robot did not send, the window tells what
 it would have been worth (as in Foerster et al., 2018, where a critic guesses it).
+
+News matter for longer than a window: they are passed on, and nobody hears the same again soon. So
+both ways of the window may be followed over those after it, in which everyone hears whom it heard.
 """
 
 import copy
-from collections.abc import Callable
-from typing import TypeVar
+from collections.abc import Sequence
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -21,10 +24,66 @@ from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
 Kind = TypeVar("Kind", bound=Channel | VaryingChannel)
-Replay = Callable[[np.ndarray, np.ndarray], np.ndarray]  # missions and recipients; gains
+Heard = Int[np.ndarray, "_ N"]  # whom each robot decodes, itself if none; a row for each window
 
 
-def credits_of(
+class PlayedWindow(NamedTuple):
+    """A window of B missions as it was, and as it would have been had one robot acted otherwise."""
+
+    timestamp: Float[np.ndarray, "B N N"]  # T before it [windows]
+    after: Float[np.ndarray, "B N N"]  # T after it [windows]
+    now: Float[np.ndarray, "B"]  # its start [windows]
+    is_active: Bool[np.ndarray, "B N"]  # robots that have not failed
+    heard: Heard  # in the first slot, [B N]
+    heard_answer: Heard  # in the second one, [B N]
+    # R robots that speak or might have spoken.
+    mission: Int[np.ndarray, "R"]
+    robot: Int[np.ndarray, "R"]
+    spoke: Bool[np.ndarray, "R"]  # whether it spoke, and otherwise is silent, or the reverse
+    otherwise: Heard  # whom all hear in the first slot if this one acts otherwise, [R N]
+    otherwise_answer: Heard  # likewise in the second, [R N]
+    is_last: bool  # of its missions
+
+
+def credits_over(windows: Sequence[PlayedWindow], horizon: int) -> Float[np.ndarray, "S B N"]:
+    """Return the age that the team would not have lost in some windows without each robot.
+
+    Args:
+        windows: S windows one after the other; missions may end in between, and others begin.
+        horizon: Over how many windows ages are summed up, from a packet's own on. Fewer are left at
+            the end of a mission, or of what was flown.
+
+    Returns:
+        The credit of each robot's packet, sent or only considered, [S, B, N], summed over pairs of
+        robots and windows [windows]; it may be negative. Of silence it is 0.
+    """
+    credit = np.zeros((len(windows), *windows[0].now.shape, windows[0].timestamp.shape[1]))
+    after = np.stack([window.after for window in windows])
+    now = np.stack([window.now for window in windows])
+    is_active = np.stack([window.is_active for window in windows])
+    heard = np.stack([window.heard for window in windows])
+    heard_answer = np.stack([window.heard_answer for window in windows])
+    ends = [n + 1 for n, window in enumerate(windows) if window.is_last]
+    for first, window in enumerate(windows):
+        stop = min([first + horizon, len(windows), *[end for end in ends if end > first]])
+        lost = np.zeros(len(window.robot))
+        _follow(
+            timestamp=window.timestamp,
+            after=after[first:stop],
+            now=now[first:stop],
+            is_active=is_active[first:stop],
+            heard=heard[first:stop],
+            heard_answer=heard_answer[first:stop],
+            mission=window.mission,
+            otherwise=window.otherwise,
+            otherwise_answer=window.otherwise_answer,
+            lost=lost,
+        )
+        credit[first, window.mission, window.robot] = np.where(window.spoke, lost, 0.0 - lost)
+    return credit
+
+
+def play_otherwise(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
     recipient: Int[np.ndarray, "B N"],
@@ -32,8 +91,9 @@ def credits_of(
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None = None,
     considered: Int[np.ndarray, "B N"] | None = None,
-) -> Float[np.ndarray, "B N"]:
-    """Return the age that the team would not have lost in a window without each robot.
+    is_last: bool = False,
+) -> PlayedWindow:
+    """Play a window again, and once for each robot that speaks or might have spoken.
 
     Args:
         timestamp: T at the end of the window before [windows], [B N N].
@@ -44,10 +104,10 @@ def credits_of(
         is_active: Robots that have not failed, [B N]; without it, all count.
         considered: Whom each robot might have addressed, [B N]: who does speak, its recipient, and
             others anyone, or themselves. Without it, `recipient`.
+        is_last: Whether the missions end with it.
 
     Returns:
-        The credit of each robot's packet, sent or only considered, [B N], summed over pairs of
-        robots [windows]; it may be negative. Of silence it is 0.
+        What was heard, and what would have been.
     """
     if considered is None:
         considered = recipient
@@ -56,64 +116,91 @@ def credits_of(
         silence(recipient, is_active)
         considered = considered.copy()
         silence(considered, is_active)
-        # Nothing is gained by news of a robot that has failed: it is not counted in the age.
-        timestamp = np.where(is_active[:, None, :], timestamp, np.inf)
 
-    # Without shapes: they would be made anew in every window, which takes as long as the replay.
-    def replayed(rows: np.ndarray, recipient: np.ndarray) -> np.ndarray:
-        """Return the gains of the windows of these missions with other recipients [windows]."""
-        fresh = snapshot_channel(channel)
-        its = None if is_active is None else is_active[rows]
-        return gain(
-            timestamp=timestamp,
-            position_m=position_m[rows],
-            recipient=recipient,
-            channel=fresh,
-            now=now[rows],
-            mission=rows,
-            is_active=its,
-        )
-
-    at_once = isinstance(channel, (FreeSpaceRadio, VaryingChannel))
     # Each packet is left out of a window that had it, or put into one that had not.
     robots = np.arange(recipient.shape[1])
     otherwise = np.where(recipient == robots, considered, robots)
-    by_windows = _lost_at_once if at_once else _lost_in_turn
-    lost = by_windows(recipient, otherwise, replayed)
-    return np.where(recipient == robots, 0.0 - lost, lost)
-
-
-def _lost_at_once(
-    recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"], replayed: Replay
-) -> Float[np.ndarray, "B N"]:
-    """Return what windows lose if robots, one at a time, act otherwise: all as rows of one batch.
-
-    That is ten times faster than one by one.
-    """
+    mission, robot = np.nonzero(otherwise != recipient)
+    world = _World(position_m=position_m, channel=channel, now=now, is_active=is_active)
+    if isinstance(channel, (FreeSpaceRadio, VaryingChannel)):
+        heard, heard_answer = _played_at_once(world, recipient, otherwise)
+    else:
+        heard, heard_answer = _played_in_turn(world, recipient, otherwise)
     num_missions = len(recipient)
+    after = timestamp.copy()
+    _merge_windows(after, now, heard, heard_answer)
+    return PlayedWindow(
+        timestamp=timestamp,
+        after=after,
+        now=now.copy(),
+        is_active=np.ones(recipient.shape, np.bool_) if is_active is None else is_active.copy(),
+        heard=heard[:num_missions],
+        heard_answer=heard_answer[:num_missions],
+        mission=mission,
+        robot=robot,
+        spoke=recipient[mission, robot] != robot,
+        otherwise=heard[num_missions:],
+        otherwise_answer=heard_answer[num_missions:],
+        is_last=is_last,
+    )
+
+
+class _World(NamedTuple):
+    """In what windows of B missions are played."""
+
+    position_m: Float[np.ndarray, "B N 2"]
+    channel: Channel | VaryingChannel
+    now: Float[np.ndarray, "B"]
+    is_active: Bool[np.ndarray, "B N"] | None
+
+    def play(self, mission: Int[np.ndarray, "W"], recipient: Heard) -> tuple[Heard, Heard]:
+        """Return who decodes whom in both slots of W windows, each of one of the missions."""
+        channel = snapshot_channel(self.channel)
+        position_m = self.position_m[mission]
+        now = self.now[mission]
+        is_active = None if self.is_active is None else self.is_active[mission]
+        first = channel_at(channel, now + SLOT_WINDOWS, mission)
+        second = channel_at(channel, now + 2 * SLOT_WINDOWS, mission)
+        heard = checked_decode(first, position_m, recipient)
+        silence(heard, is_active)
+        answered = respondents(Phase(recipient=recipient, heard=heard))
+        heard_answer = checked_decode(second, position_m, answered)
+        silence(heard_answer, is_active)
+        return heard, heard_answer
+
+
+def _played_at_once(
+    world: _World, recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"]
+) -> tuple[Heard, Heard]:
+    """Return what is heard in the windows as they were, and then in those of robots, one by one.
+
+    All of them are rows of one batch, which is ten times faster than one after the other.
+    """
     mission, robot = np.nonzero(otherwise != recipient)
     others = recipient[mission]  # a row for each robot that acts otherwise
     others[np.arange(robot.size), robot] = otherwise[mission, robot]
-    rows = np.concatenate([np.arange(num_missions), mission])  # the windows as they were come first
-    gained = replayed(rows, np.concatenate([recipient, others]))
-    lost = np.zeros(recipient.shape)
-    lost[mission, robot] = gained[mission] - gained[num_missions:]
-    return lost
+    rows = np.concatenate([np.arange(len(recipient)), mission])
+    return world.play(rows, np.concatenate([recipient, others]))
 
 
-def _lost_in_turn(
-    recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"], replayed: Replay
-) -> Float[np.ndarray, "B N"]:
-    """Replay B missions at a time: a user's channel meets them as in flight, draws included."""
-    missions = np.arange(len(recipient))
-    together = replayed(missions, recipient)
+def _played_in_turn(
+    world: _World, recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"]
+) -> tuple[Heard, Heard]:
+    """Play B missions at a time: a user's channel meets them as in flight, draws included."""
+    num_missions = len(recipient)
+    missions = np.arange(num_missions)
     differs = otherwise != recipient
-    lost = np.zeros(recipient.shape)
     turn = np.cumsum(differs, axis=1) * differs  # 1 for the first of a mission, and so on
+    row = np.cumsum(differs).reshape(differs.shape) - 1 + num_missions
+    heard = np.empty((num_missions + differs.sum(), recipient.shape[1]), np.int64)
+    heard_answer = heard.copy()
+    heard[:num_missions], heard_answer[:num_missions] = world.play(missions, recipient)
     for n in range(1, int(turn.max(initial=0)) + 1):
-        gained = replayed(missions, np.where(turn == n, otherwise, recipient))
-        lost += np.where(turn == n, (together - gained)[:, None], 0.0)
-    return lost
+        its = world.play(missions, np.where(turn == n, otherwise, recipient))
+        mission, robot = np.nonzero(turn == n)
+        heard[row[mission, robot]] = its[0][mission]
+        heard_answer[row[mission, robot]] = its[1][mission]
+    return heard, heard_answer
 
 
 def snapshot_channel(channel: Kind) -> Kind:
@@ -122,53 +209,79 @@ def snapshot_channel(channel: Kind) -> Kind:
     return copy.deepcopy(channel) if draws else channel
 
 
-def gain(
+@compiled()
+def _merge_windows(
     timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "W N 2"],
-    recipient: Int[np.ndarray, "W N"],
-    channel: Channel | VaryingChannel,
-    now: Float[np.ndarray, "W"],
-    mission: Int[np.ndarray, "W"],
-    is_active: Bool[np.ndarray, "W N"] | None = None,
-) -> Float[np.ndarray, "W"]:
-    """Return the age that W windows of Alg. 1 take from the team, summed over pairs [windows].
-
-    Arguments are as in `credits_of`, one row a window; `mission` is that of the T it starts from.
-    """
-    first = channel_at(channel, now + SLOT_WINDOWS, mission)
-    second = channel_at(channel, now + 2 * SLOT_WINDOWS, mission)
-    heard = checked_decode(first, position_m, recipient)
-    silence(heard, is_active)
-    answered = respondents(Phase(recipient=recipient, heard=heard))
-    heard_answer = checked_decode(second, position_m, answered)
-    silence(heard_answer, is_active)
-    gained = np.empty(len(mission))
-    _replay(
-        timestamp=timestamp,
-        mission=mission,
-        heard=heard,
-        heard_answer=heard_answer,
-        now=now,
-        gained=gained,
-    )
-    return gained
+    now: Float[np.ndarray, "B"],
+    heard: Heard,
+    heard_answer: Heard,
+) -> None:
+    """Pass T of B missions through a window, by who decodes whom in its two slots."""
+    packet = np.empty(timestamp.shape[1:])
+    for b in range(timestamp.shape[0]):
+        _merge_slot(timestamp[b], packet, now[b] + SLOT_WINDOWS, heard[b])
+        _merge_slot(timestamp[b], packet, now[b] + 2 * SLOT_WINDOWS, heard_answer[b])
 
 
 @compiled()
-def _replay(
-    timestamp: Float[np.ndarray, "B N N"],
-    mission: Int[np.ndarray, "W"],
-    heard: Int[np.ndarray, "W N"],
-    heard_answer: Int[np.ndarray, "W N"],
-    now: Float[np.ndarray, "W"],
-    gained: Float[np.ndarray, "W"],
+def _merge_slot(
+    timestamp: Float[np.ndarray, "N N"],
+    packet: Float[np.ndarray, "N N"],
+    end: float,
+    heard: Int[np.ndarray, "N"],
 ) -> None:
-    """Pass timestamps alone through the two slots, by who decoded whose packet."""
-    for w in range(mission.shape[0]):
-        before = timestamp[mission[w]].copy()
-        observe_own(before, now[w] + SLOT_WINDOWS)
-        after = before.copy()
-        gained[w] = merge_timestamps(before, heard[w], after)
-        observe_own(after, now[w] + 2 * SLOT_WINDOWS)
-        before[...] = after
-        gained[w] += merge_timestamps(before, heard_answer[w], after)
+    """Pass T through a slot that ends at a time; `packet` is room."""
+    observe_own(timestamp, end)
+    packet[...] = timestamp
+    merge_timestamps(packet, heard, timestamp)
+
+
+@compiled()
+def _follow(
+    timestamp: Float[np.ndarray, "B N N"],
+    after: Float[np.ndarray, "S B N N"],
+    now: Float[np.ndarray, "S B"],
+    is_active: Bool[np.ndarray, "S B N"],
+    heard: Int[np.ndarray, "S B N"],
+    heard_answer: Int[np.ndarray, "S B N"],
+    mission: Int[np.ndarray, "R"],
+    otherwise: Heard,
+    otherwise_answer: Heard,
+    lost: Float[np.ndarray, "R"],
+) -> None:
+    """Follow each window that is otherwise; write by how much ages are higher, in all windows."""
+    other = np.empty(timestamp.shape[1:])
+    packet = np.empty(timestamp.shape[1:])
+    for r in range(len(mission)):
+        b = mission[r]
+        other[...] = timestamp[b]
+        for n in range(len(now)):
+            first = otherwise[r] if n == 0 else heard[n, b]
+            second = otherwise_answer[r] if n == 0 else heard_answer[n, b]
+            _merge_slot(other, packet, now[n, b] + SLOT_WINDOWS, first)
+            _merge_slot(other, packet, now[n, b] + 2 * SLOT_WINDOWS, second)
+            risen, is_same = _risen(after[n, b], other, is_active[n, b])
+            lost[r] += risen
+            if is_same:
+                break  # and so it stays
+
+
+# Added up in any order: only so loops of sums become vectors.
+@compiled(fastmath={"nnan", "reassoc"}, makes_arrays=False)
+def _risen(
+    timestamp: Float[np.ndarray, "N N"],
+    other: Float[np.ndarray, "N N"],
+    is_active: Bool[np.ndarray, "N"],
+) -> tuple[float, bool]:
+    """Return by how much ages are higher at another T [windows], and whether it is the same T."""
+    total = 0.0
+    apart = 0.0
+    for i in range(len(other)):
+        # Robots that have failed are not counted in the age, nor is what they know.
+        if not is_active[i]:
+            continue
+        for k in range(len(other)):
+            risen = timestamp[i, k] - other[i, k]
+            total += risen if is_active[k] else 0.0
+            apart += abs(risen)
+    return total, apart == 0.0

@@ -11,7 +11,12 @@ from typing import Any
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.envs.credit import credits_of, snapshot_channel
+from swarm_mj.envs.credit import (
+    PlayedWindow,
+    credits_over,
+    play_otherwise,
+    snapshot_channel,
+)
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
@@ -98,20 +103,14 @@ class MissionBatch:
         self._see()
         check_width(self.features, self._extractor, self.graphs)
 
-    def step(
-        self,
-        recipient: Int[np.ndarray, "B N"],
-        considered: Int[np.ndarray, "B N"] | None = None,
-    ) -> Float[np.ndarray, "B N"]:
+    def step(self, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
         """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
 
         Args:
-            recipient: Whom each robot addresses, [B N], from 0 to N - 1.
-            considered: Whom it might have addressed, where it is silent: "credit" is that of these
-                packets as well; see `credits_of`.
+            recipient: Whom each robot addresses, [B, N], from 0 to N - 1.
 
         Returns:
-            The reward of each robot, [B N]: minus the cost that `reward` names, in its unit, the
+            The reward of each robot, [B, N]: minus the cost that `reward` names, in its unit, the
             same for a whole team; or, for "credit", the age that its own packets saved, a mean over
             pairs of robots [windows].
 
@@ -120,13 +119,32 @@ class MissionBatch:
                 nothing has moved.
         """
         recipient = checked_robots("recipient", recipient, self.shape)
-        if self.reward != "credit":
-            cost = BY_REWARD[self.reward].of_window(self.fly(recipient))
-            if cost is None:
-                raise ValueError(f"reward {self.reward} needs a task that has a cost")
-            return np.broadcast_to(-cost[:, None], recipient.shape)
+        if self.reward == "credit":
+            return self.credits_over([self.play(recipient)], horizon=1)[0]
+        cost = BY_REWARD[self.reward].of_window(self.fly(recipient))
+        if cost is None:
+            raise ValueError(f"reward {self.reward} needs a task that has a cost")
+        return np.broadcast_to(-cost[:, None], recipient.shape)
+
+    def play(
+        self,
+        recipient: Int[np.ndarray, "B N"],
+        considered: Int[np.ndarray, "B N"] | None = None,
+    ) -> PlayedWindow:
+        """Fly a window as `step` does, and play it again as it might have been.
+
+        Args:
+            recipient: Whom each robot addresses, [B, N], from 0 to N - 1.
+            considered: Whom it might have addressed, where it is silent; see `play_otherwise`.
+
+        Returns:
+            What `credits_over` takes.
+
+        Raises:
+            ValueError: As `step` does.
+        """
         swarm = self.flown
-        # The credit replays this window, so it needs T and the channel's draws from before it.
+        # The window is played again, so that needs T and the channel's draws from before it.
         before = swarm.buffers.timestamp.copy()
         # The first news of a teammate lowers the age by the few windows flown, and a robot that
         # waits for more loses nothing: so it may count for more.
@@ -134,17 +152,22 @@ class MissionBatch:
         start = swarm.now
         channel = snapshot_channel(swarm.channel)
         self.fly(recipient)
-        states = swarm.states
-        credit = credits_of(
+        return play_otherwise(
             before,
-            states.position_m,
+            swarm.states.position_m,
             recipient,
             channel,
             now=start,
-            is_active=states.is_active,
+            is_active=swarm.states.is_active,
             considered=considered,
+            is_last=self.is_over,
         )
-        return credit / self.mission.num_robots**2  # a mean over pairs: team sizes count alike
+
+    def credits_over(
+        self, windows: Sequence[PlayedWindow], horizon: int
+    ) -> Float[np.ndarray, "S B N"]:
+        """Return robots' credits as `credit.credits_over` does, as means over pairs [windows]."""
+        return credits_over(windows, horizon) / self.mission.num_robots**2  # sizes count alike
 
     def fly(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
         """Fly a window as `step` does, without computing rewards.

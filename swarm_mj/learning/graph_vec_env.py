@@ -5,7 +5,7 @@ Batches are staggered, so that every rollout holds windows from all parts of a m
 
 from collections.abc import Callable, Sequence
 from itertools import cycle
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from gymnasium import spaces
@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
+from swarm_mj.envs.credit import PlayedWindow
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.vec_env import SwarmVecEnv
 from swarm_mj.learning.credit_scale import CreditScale
@@ -20,6 +21,13 @@ from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.policies.gnn.own_networks import empty_network
 from swarm_mj.protocol.buffers import NO_PARENT
+
+
+class Credits(NamedTuple):
+    """What the packets of S windows, sent or only considered, were worth to each of E robots."""
+
+    credit: Float[np.ndarray, "S E"]  # over the number of pairs, and by its scale if it has one
+    is_whole: Bool[np.ndarray, "S E"]  # whether their horizon was flown, or the mission's end
 
 
 class GraphVecEnv(SwarmVecEnv):
@@ -34,8 +42,9 @@ class GraphVecEnv(SwarmVecEnv):
     Attributes:
         recalls: Asks what the network remembers since its last decision, [E *robots H]; None unless
             it has a memory.
-        considers: Asks whom robots might have addressed in their last decision, [E], where rewards
-            are to be those packets' credits as well; None where they are not.
+        considers: Asks whom robots might have addressed in their last decision, [E], where those
+            packets are to have credits as well, which `take_credits` returns, and rewards are 0;
+            None where they are not.
     """
 
     recalls: Callable[[], np.ndarray] | None = None
@@ -82,6 +91,8 @@ class GraphVecEnv(SwarmVecEnv):
         else:
             action = spaces.MultiDiscrete([self.num_nodes] * self.num_nodes)
         super().__init__(self.batches, self.agent, spaces.Dict(seen), action)
+        # Of each batch: its windows of late, whose credits have not been taken.
+        self._played: list[list[PlayedWindow]] = [[] for _ in self.batches]
 
     @property
     def num_teams(self) -> int:
@@ -116,16 +127,36 @@ class GraphVecEnv(SwarmVecEnv):
             remembered = self.recalls()
             self.memory[:] = remembered if self.agent == "robot" else remembered[self._is_robot]
         seen, reward, done, infos = super().step_wait()
-        for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
-            reward[envs] = scale.divided(reward[envs])
+        if self.considers is None:
+            for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
+                reward[envs] = scale.divided(reward[envs])
         return seen, reward, done, infos
+
+    def take_credits(self, horizon: int) -> Credits:
+        """Return the credits of the windows flown since they were last taken; see `considers`."""
+        num_windows = len(self._played[0])
+        credit = np.zeros((num_windows, self.num_envs), np.float32)
+        is_whole = np.zeros(credit.shape, np.bool_)
+        for n, (batch, envs) in enumerate(zip(self.batches, self._envs, strict=True)):
+            its = batch.credits_over(self._played[n], horizon).astype(np.float32)
+            for window, row in enumerate(its.reshape(num_windows, -1)):
+                if self.credit_scales:
+                    row = self.credit_scales[n % len(self.credit_scales)].divided(row)
+                credit[window, envs] = row
+            lasts = [window for window, played in enumerate(self._played[n]) if played.is_last]
+            num_whole = max([num_windows - horizon, *lasts]) + 1
+            is_whole[: max(0, num_whole), envs] = True
+            self._played[n].clear()
+        return Credits(credit=credit, is_whole=is_whole)
 
     def _fly(
         self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
     ) -> Float[np.ndarray, "B N"]:
         if self.considers is None:
             return batch.step(recipient)
-        return batch.step(recipient, self.considers()[envs].reshape(batch.shape))
+        considered = self.considers()[envs].reshape(batch.shape)
+        self._played[self._envs.index(envs)].append(batch.play(recipient, considered))
+        return np.zeros(batch.shape)
 
     def _begin(self, n: int) -> None:
         if self.memory is not None:

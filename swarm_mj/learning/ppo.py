@@ -3,6 +3,7 @@
 import warnings
 from collections.abc import Callable, Generator
 from dataclasses import replace
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -16,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import Tensor
 from torch.optim.swa_utils import AveragedModel
 
-from swarm_mj.learning.graph_vec_env import GraphVecEnv
+from swarm_mj.learning.graph_vec_env import Credits, GraphVecEnv
 from swarm_mj.learning.settings import Device, PpoSettings, Training
 from swarm_mj.policies.gnn.decisions import evaluated, recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
@@ -111,6 +112,7 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
         assert isinstance(model.rollout_buffer, SpeechRolloutBuffer)
         graphs.considers = policy_of(model).considered_recipient
         model.rollout_buffer.considers = policy_of(model).considered
+        model.rollout_buffer.takes_credits = partial(graphs.take_credits, ppo.horizon)
     model.optimises_on = optimising_device(device)
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
     model.lr_schedule = lambda _: decayed_rate(ppo, model._n_updates)
@@ -370,11 +372,14 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
 
     Attributes:
         considers: Asks for what is considered in the window that is added.
+        takes_credits: Asks for the credits of the rollout's windows.
         weights: Those of credits, by window and row.
         done_log_probs: Log-probabilities of what robots did, likewise.
+        is_whole: Whether a row's credit is over the whole horizon, likewise; others teach nothing.
     """
 
     considers: Callable[[], Considered]
+    takes_credits: Callable[[], Credits]
 
     def reset(self) -> None:
         """Begin a rollout."""
@@ -399,8 +404,9 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
         super().add(obs, action, reward, episode_start, value, log_prob)
 
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:
-        """Advantages and returns are the rewards; what comes later is worth nothing."""
+        """Returns are credits, and so are advantages, by their weights; values count for nothing."""
         del last_values, dones
+        self.rewards[...], self.is_whole = self.takes_credits()
         self.advantages[...] = self.rewards * self.weights
         self.returns[...] = self.rewards
 
@@ -418,6 +424,7 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
                 setattr(self, name, getattr(self, name).reshape(num_rows, 1))
             self.generator_ready = True
         is_kept = self.actions[:, 0] != self.observations["owner"][:, 0]
+        is_kept &= self.is_whole.ravel()
         kept = np.random.permutation(np.flatnonzero(is_kept))  # noqa: NPY002
         num_batches = max(1, round(num_rows / (batch_size or num_rows)))
         for rows in np.array_split(kept, num_batches):

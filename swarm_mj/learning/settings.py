@@ -53,7 +53,9 @@ class PpoSettings:
         num_steps: Windows of each mission in a rollout.
         num_minibatches: Into how many a rollout is divided.
         num_epochs: Passes over a rollout.
-        discount: Gamma; 0 makes a packet's credit that of its own window alone.
+        horizon: Over how many windows a packet's credit is summed up, its own included; at most
+            `num_steps`, and 1 with a discount.
+        discount: Gamma; 0 pays a packet by its credit alone, and nothing that comes later.
         gae_lambda: Lambda of the generalised advantage estimate.
         clip: By how much the probability ratio may differ from 1.
         clips_value: Whether values are clipped by the same number.
@@ -84,7 +86,7 @@ class PpoSettings:
     decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
     least_share: float = setting(0.03, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(
-        8,
+        32,
         "windows of each mission in a rollout",
         label="rollout",
         flag="--rollout-windows",
@@ -92,12 +94,22 @@ class PpoSettings:
         high=100_000,
     )
     num_minibatches: int = setting(
-        5, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
+        10, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
     )
     num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
+    # News are passed on, and spare others to say the same: what they are worth shows later.
+    horizon: int = setting(
+        16,
+        "windows over which a packet's credit is summed up, from its own on; at most "
+        "--rollout-windows",
+        label="credit-horizon",
+        flag="--credit-horizon",
+        low=1,
+        high=100_000,
+    )
     discount: float = setting(
         0.0,
-        "gamma; 0: a packet's credit is that of its own window alone",
+        "gamma; 0: a packet is paid its credit alone, and nothing that comes later",
         low=0.0,
         high=1.0,
     )
@@ -113,6 +125,16 @@ class PpoSettings:
 
     def __post_init__(self) -> None:
         check(self)
+        if self.discount > 0.0 and self.horizon > 1:
+            raise ValueError(
+                f"credit-horizon {self.horizon} takes no discount, not {self.discount:g}; choose "
+                "--credit-horizon 1, or --discount 0"
+            )
+        if self.horizon > self.num_steps:
+            raise ValueError(
+                f"credit-horizon {self.horizon} is longer than a rollout; choose at most "
+                f"{self.num_steps}, or more --rollout-windows"
+            )
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -145,6 +167,7 @@ PAPER_TEAM_PPO = PpoSettings(
     num_steps=4,
     num_minibatches=2,  # of 64
     num_epochs=4,
+    horizon=1,
     discount=0.99,
     gae_lambda=0.95,
     clip=0.1,

@@ -40,17 +40,16 @@ def merge_timestamps(
     packet: Float[np.ndarray, "N N"],
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
-) -> float:
-    """Merge senders' T of before the slot into receivers'; return the sum of rises."""
-    total = 0.0
+) -> None:
+    """Merge senders' T of before the slot into receivers'."""
     for i in range(heard.shape[0]):
         j = heard[i]
         if j != i:
+            sent = packet[j]
+            held = timestamp[i]
             for k in range(heard.shape[0]):
-                if is_newer(packet[j, k], timestamp[i, k]):
-                    total += packet[j, k] - timestamp[i, k]
-                    timestamp[i, k] = packet[j, k]
-    return total
+                # Written each time: the loop becomes vectors.
+                held[k] = sent[k] if is_newer(sent[k], held[k]) else held[k]
 
 
 @compiled(fastmath={"nnan", "nsz"})

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from turns import settled
 
-from swarm_mj.envs.credit import credits_of, gain, snapshot_channel
+from swarm_mj.envs.credit import credits_over, play_otherwise, snapshot_channel
 from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.protocol.window import window
@@ -71,8 +71,11 @@ def assert_rewards_are_those_of_a_replay(
         silent = recipient == np.arange(mission.num_robots)
         others = random_recipients(rng, batch.shape, also_considered)
         considered = np.where(silent, others, recipient)
-        asked = (considered,) if also_considered else ()
-        found = batch.step(recipient, *asked) * mission.num_robots**2
+        if also_considered:
+            played = batch.play(recipient, considered)
+            found = credits_over([played], horizon=1)[0]
+        else:
+            found = batch.step(recipient) * mission.num_robots**2
         expected = credits_by_replay(
             swarm, before, buffers, recipient, considered, now, unknown_age
         )
@@ -172,17 +175,22 @@ def standing(position_m):
     return states, channel
 
 
+def credits_of(*played, **its):
+    """Those of one window alone."""
+    return credits_over([play_otherwise(*played, **its)], horizon=1)[0]
+
+
 def test_who_destroys_a_packet_pays_for_it():
     """Robots 0 and 1 are as far from robot 2, so that it decodes neither of the two."""
     position_m, channel = standing([[-20.0, 0.0], [20.0, 0.0], [0.0, 0.0]])
     timestamp, now = np.full((1, 3, 3), 4.0), np.array([10.0])
     both, one = np.array([[2, 2, 2]]), np.array([[2, 1, 2]])
-    gained = gain(timestamp, position_m, one, channel, now, np.array([0]))
-    assert gained[0] > 0.0
+    alone = credits_of(timestamp, position_m, one, channel, now)
+    gained = alone[0, 0]
+    assert gained > 0.0
+    np.testing.assert_allclose(alone, [[gained, 0.0, 0.0]])
     credit = credits_of(timestamp, position_m, both, channel, now)
-    np.testing.assert_allclose(credit, [[-gained[0], -gained[0], 0.0]])
-    credit = credits_of(timestamp, position_m, one, channel, now)
-    np.testing.assert_allclose(credit, [[gained[0], 0.0, 0.0]])
+    np.testing.assert_allclose(credit, [[-gained, -gained, 0.0]])
 
 
 def test_a_gain_is_the_news_of_the_packet_and_of_its_answer():
@@ -192,7 +200,119 @@ def test_a_gain_is_the_news_of_the_packet_and_of_its_answer():
     )  # fmt: skip
     to_one = np.array([[1, 1, 2, 3]])
     position_m = np.zeros((1, 4, 2))
-    gained = gain(timestamp, position_m, to_one, to_the_addressee, np.array([10.0]), np.array([0]))
+    credit = credits_of(timestamp, position_m, to_one, to_the_addressee, np.array([10.0]))
     told = (10.5 - 3.0) + (7.0 - 2.0)
     answered = (11.0 - 4.0) + (6.0 - 1.0)
-    assert gained[0] == pytest.approx(told + answered)
+    assert credit[0, 0] == pytest.approx(told + answered)
+
+
+# Over a horizon.
+
+
+def test_news_count_until_they_would_have_come_anyway():
+    """By hand: 0 tells 1 of itself at 10.5; then, in the third window, again at 12.5."""
+    timestamp = np.full((1, 3, 3), 4.0)
+    position_m = np.zeros((1, 3, 2))
+
+    speaks, silent = np.array([[1, 1, 2]]), np.array([[0, 1, 2]])
+    windows = []
+    for n, recipient in enumerate([speaks, silent, speaks, silent]):
+        now = np.array([10.0 + n])
+        played = play_otherwise(timestamp, position_m, recipient, to_the_addressee, now)
+        windows.append(played)
+        timestamp = played.after
+    told = (10.5 - 4.0) + (11.0 - 4.0)  # to 1, and its answer to 0
+    for horizon, num_windows in ((1, 1), (2, 2), (3, 2), (4, 2)):
+        credit = credits_over(windows, horizon)
+        # In the third window both hear of each other anyway, whatever was heard in the first.
+        assert credit[0, 0, 0] == pytest.approx(num_windows * told), horizon
+    again = credits_over(windows, 2)[2, 0, 0]
+    assert again == pytest.approx(2 * ((12.5 - 10.5) + (13.0 - 11.0)))
+    assert np.all(credits_over(windows, 2)[:, 0, 1:] == 0.0)
+
+
+def merged(timestamp, heard, time):
+    """T after one slot of all missions, by plain loops."""
+    timestamp = timestamp.copy()
+    for b, i in np.ndindex(heard.shape):
+        timestamp[b, i, i] = time[b]
+    after = timestamp.copy()
+    for b, j in np.ndindex(heard.shape):
+        after[b, j] = np.maximum(timestamp[b, j], timestamp[b, heard[b, j]])
+    return after
+
+
+def followed(timestamp, windows):
+    """T after each of some windows, of which starts and who decodes whom in both slots are given."""
+    found = []
+    for now, slots in windows:
+        for n, heard in enumerate(slots):
+            timestamp = merged(timestamp, heard, now + 0.5 * (n + 1))
+        found.append(timestamp)
+    return np.array(found)
+
+
+@pytest.mark.parametrize(
+    "mission", [WALKING, FADED, FAILING], ids=["walking", "fades and losses", "robots that fail"]
+)
+def test_over_a_horizon_later_windows_are_heard_as_they_were(mission):
+    """By the public protocol in a packet's own window, and by plain loops in those after it."""
+    batch = MissionBatch(mission, 2, features="paper", reward="credit", unknown_age=7.0)
+    rng = np.random.default_rng(1)
+    horizon, length = 5, 12
+    flown, played, known, otherwise = [], [], [], []
+    batch.restart([4, 2], last_window=length)
+    while not batch.is_over:
+        swarm, now = batch.flown, batch.flown.now.copy()
+        buffers, channel = copy.deepcopy(swarm.buffers), snapshot_channel(swarm.channel)
+        recipient = random_recipients(rng, batch.shape, 0.25)
+        silent = recipient == np.arange(mission.num_robots)
+        considered = np.where(silent, random_recipients(rng, batch.shape, 0.3), recipient)
+        played.append(batch.play(recipient, considered))
+        flown.append((now, [phase.heard for phase in swarm.phases]))
+        known.append(np.where(buffers.is_known, buffers.timestamp, -7.0))
+        its = {}
+        for b, i in np.argwhere(considered != np.arange(mission.num_robots)).tolist():
+            changed = recipient.copy()
+            changed[b, i] = considered[b, i] if silent[b, i] else i
+            states = settled(swarm.states, changed)
+            slots = window(copy.deepcopy(buffers), *states, copy.deepcopy(channel), now)
+            its[b, i] = ([phase.heard for phase in slots], -1.0 if silent[b, i] else 1.0)
+        otherwise.append((its, batch.is_active.copy()))
+    credit = credits_over(played, horizon)
+    num_lasting = 0
+    for n, (its, _) in enumerate(otherwise):
+        later = flown[n + 1 : n + horizon]
+        truth = followed(known[n], [flown[n], *later])
+        for (b, i), (slots, sign) in its.items():
+            other = followed(known[n], [(flown[n][0], slots), *later])
+            lost = 0.0
+            for window_after, (true_t, other_t) in enumerate(zip(truth, other, strict=True)):
+                active = otherwise[n + window_after][1][b]
+                pairs = active[:, None] & active[None, :]
+                lost += np.sum((true_t - other_t)[b] * pairs)
+            assert credit[n, b, i] == pytest.approx(sign * lost, abs=1e-9)
+            num_lasting += credit[n, b, i] != pytest.approx(
+                credits_over(played[n : n + 1], 1)[0, b, i]
+            )
+    assert num_lasting > 20
+    silent_rows = np.ones(credit.shape, bool)
+    for n, (its, _) in enumerate(otherwise):
+        for b, i in its:
+            silent_rows[n, b, i] = False
+    assert np.all(credit[silent_rows] == 0.0)
+
+
+def test_a_horizon_ends_with_the_mission():
+    """What the next mission's robots know was not lost by this one's packets."""
+    batch = MissionBatch(WALKING, 2, features="paper", reward="credit")
+    rng = np.random.default_rng(2)
+    windows = []
+    for seeds in ([4, 2], [3, 5]):
+        batch.restart(seeds, last_window=4)
+        for _ in range(4):
+            windows.append(batch.play(random_recipients(rng, batch.shape, 0.4)))
+    together = credits_over(windows, 3)
+    apart = [credits_over(part, 3) for part in (windows[:4], windows[4:])]
+    np.testing.assert_array_equal(together, np.concatenate(apart))
+    assert np.any(together[2:4] != 0.0)

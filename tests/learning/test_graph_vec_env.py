@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from stable_baselines3.common.vec_env import VecCheckNan, VecMonitor
 
+from swarm_mj.envs.credit import credits_over
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, LAST_TRAINING_SEED
 from swarm_mj.learning.graph_vec_env import GraphVecEnv
 from swarm_mj.learning.settings import HELD_OUT_SEED, usual_settings
@@ -217,6 +218,57 @@ def test_batches_of_one_kind_share_its_scale():
             factor = 0.999 if n < 4 else 1.0  # the first batch counts as a window before
             counts[n % 4] += factor * np.count_nonzero(reward[envs])
     np.testing.assert_allclose([scale.count for scale in twice.credit_scales], counts)
+
+
+@pytest.mark.parametrize("scaling", ["none", "kind"])
+def test_credits_taken_are_those_of_the_windows_flown_since(scaling):
+    """Of packets sent or only considered; whole where the horizon, or the mission's end, was."""
+    _, env = several_kinds(credit_scaling=scaling)
+    horizon, length = 3, WINDOWS + 2
+    rng = np.random.default_rng(2)
+    asked = []
+    env.considers = lambda: asked[-1]
+    played = [[] for _ in env.batches]
+
+    def watched(play, its):
+        def play_and_keep(*given):
+            its.append(play(*given))
+            return its[-1]
+
+        return play_and_keep
+
+    for batch, its in zip(env.batches, played, strict=True):
+        batch.play = watched(batch.play, its)
+    env.reset()
+    for _ in range(2):  # the second time, of what was flown after the first
+        for its in played:
+            its.clear()
+        for _ in range(length):
+            actions = drawn(env, rng)
+            own = env._owner[:, 0]
+            asked.append(np.where(actions == own, drawn(env, rng), actions))
+            _, reward, _, _ = env.step(actions)
+            assert np.all(reward == 0.0)
+        credit, is_whole = env.take_credits(horizon)
+        assert credit.shape == is_whole.shape == (length, env.num_envs)
+        considers = np.array(asked[-length:]) != own
+        assert np.any(credit[considers] < 0.0) and np.any(credit[considers] > 0.0)
+        assert np.all(credit[~considers] == 0.0)
+        for n, (batch, envs) in enumerate(zip(env.batches, env._envs, strict=True)):
+            expected = credits_over(played[n], horizon) / batch.mission.num_robots**2
+            expected = expected.reshape(length, -1)
+            if scaling == "none":
+                np.testing.assert_allclose(credit[:, envs], expected, rtol=1e-6)
+            else:
+                assert credit[-1, envs].any()
+                scale = env.credit_scales[n]
+                factor = np.sqrt(scale.count / scale.total)  # as it is in the last window
+                np.testing.assert_allclose(credit[-1, envs], expected[-1] * factor, rtol=1e-5)
+            ends = [window.is_last for window in played[n]]
+            assert any(ends)
+            for window in range(length):
+                whole = window + horizon <= length or any(ends[window:])
+                assert np.all(is_whole[window, envs] == whole)
 
 
 def mean_age(swarm, b):

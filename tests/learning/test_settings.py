@@ -7,7 +7,7 @@ import pytest
 import torch
 from small_runs import small_training
 
-from swarm_mj.learning.settings import Training, usual_settings
+from swarm_mj.learning.settings import PpoSettings, Training, usual_settings
 from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.reading import read_json
@@ -67,10 +67,25 @@ def test_missions_of_training_have_at_most_the_windows_of_those_asked_for():
         assert (its.least_windows, its.most_windows) == (least, most)
 
 
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"num_steps": 4, "horizon": 5}, "credit-horizon 5 is longer than a rollout; choose at most 4"),
+        ({"discount": 0.5, "horizon": 2}, "credit-horizon 2 takes no discount, not 0.5"),
+    ],
+)  # fmt: skip
+def test_a_horizon_that_cannot_be_is_refused(changes, said):
+    with pytest.raises(ValueError, match=said):
+        PpoSettings(**changes)
+    assert PpoSettings(num_steps=4, horizon=4).horizon == 4
+    assert PpoSettings(discount=0.5, horizon=1).discount == 0.5
+
+
 def test_silence_is_dropped_only_where_it_earns_nothing():
     robot = usual_settings("robot", paper("stationary"), (40,))
     assert robot.considers_speech == (robot.ppo.discount == 0.0)
-    assert not replace(robot, ppo=replace(robot.ppo, discount=0.5)).considers_speech
+    discounted = replace(robot.ppo, discount=0.5, horizon=1)
+    assert not replace(robot, ppo=discounted).considers_speech
     assert not small_training("team").considers_speech
 
 

@@ -30,9 +30,8 @@ def after_merge(timestamp, heard):
 def test_eq8_timestamps_are_those_of_the_buffers(seed, num_robots):
     before, heard = random_slot(seed, num_robots)
     timestamp, expected = before.copy(), after_merge(before, heard)
-    total = merge_timestamps(before, heard, timestamp)
+    merge_timestamps(before, heard, timestamp)
     np.testing.assert_array_equal(timestamp, expected)
-    assert total == np.sum(expected - before)
 
 
 @given(seed=st.integers(0, 2**32 - 1), num_robots=st.integers(1, 8))
