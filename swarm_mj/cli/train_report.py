@@ -8,6 +8,7 @@ from rich.console import Console
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import (
+    COMPARED,
     ORACLE,
     ORACLES,
     REFERENCES,
@@ -89,12 +90,26 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
         "policy kept": f"{_amount(choice.kept, cost)}, after {choice.decisions:,} decisions",
     }
     for name, each in choice.others.items():
-        known = f"; {REFERENCES[name]}" if name in REFERENCES else ""
-        rows[NAMES.get(name, name)] = _amount(each, cost) + known
+        told = _amount(each, cost)
+        if name in REFERENCES:
+            told += f"; {REFERENCES[name]}"
+        if name in COMPARED:
+            told += f"; {_when_reached(progress, name)}"
+        rows[NAMES.get(name, name)] = told
     if ORACLE not in choice.others and training.most_robots > selection.ORACLE_ROBOTS:
         too_many = f"more than {selection.ORACLE_ROBOTS} robots"
         rows[ORACLE] = f"not flown: it would take long with {too_many}"
     return rows
+
+
+def _when_reached(progress: Progress, name: str) -> str:
+    """Return in words when the held-out age was first at most that of a reference."""
+    row = selection.reached(progress.curve, name)
+    if row is None:
+        return "not reached"
+    if row.decisions == 0:
+        return "reached before training"
+    return f"reached in {row.minutes:.1f} min ({row.decisions:,} decisions)"
 
 
 def _best_so_far(run: TrainingRun, progress: Progress, best: CurveRow) -> Choice:

@@ -28,7 +28,7 @@ from swarm_mj.policies.gnn.network import Network
 from swarm_mj.system.reading import open_file, read_json, read_plain
 from swarm_mj.system.writing import write_bytes
 
-CHECKPOINT_VERSION = 6
+CHECKPOINT_VERSION = 7
 MOMENTS = ("mean", "var", "count")  # of `VecNormalize`'s returns
 
 Networks = dict[int, Network]  # of policies that may be kept, by their decisions

@@ -233,6 +233,15 @@ def reference_ages(row: Mapping[str, float]) -> dict[str, float]:
     return ages
 
 
+def reached(curve: Sequence[CurveRow], name: str) -> CurveRow | None:
+    """Return the first evaluation whose age was at most that of one of `COMPARED`, if any was."""
+    for row in curve:
+        age = reference_ages(row.references).get(name)
+        if age is not None and row.costs.aoi <= age:
+            return row
+    return None
+
+
 def behind_column(name: str) -> str:
     """Return the curve's column for how much older than one of `COMPARED` a policy's news is."""
     return column(AOI, f"behind {name}".replace(" ", "_"))
