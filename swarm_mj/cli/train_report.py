@@ -8,7 +8,6 @@ from rich.console import Console
 from swarm_mj.learning import selection
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import (
-    COMPARED,
     ORACLE,
     ORACLES,
     REFERENCES,
@@ -93,7 +92,7 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
         told = _amount(each, cost)
         if name in REFERENCES:
             told += f"; {REFERENCES[name]}"
-        if name in COMPARED:
+        if name in selection.reference_ages(progress.curve[0].references):
             told += f"; {_when_reached(progress, name)}"
         rows[NAMES.get(name, name)] = told
     if ORACLE not in choice.others and training.most_robots > selection.ORACLE_ROBOTS:
@@ -106,10 +105,10 @@ def _when_reached(progress: Progress, name: str) -> str:
     """Return in words when the held-out age was first at most that of a reference."""
     row = selection.reached(progress.curve, name)
     if row is None:
-        return "not reached"
+        return "not reached on held-out missions"
     if row.decisions == 0:
-        return "reached before training"
-    return f"reached in {row.minutes:.1f} min ({row.decisions:,} decisions)"
+        return "reached on held-out missions before training"
+    return f"reached on held-out missions in {row.minutes:.1f} min, {row.decisions:,} decisions"
 
 
 def _best_so_far(run: TrainingRun, progress: Progress, best: CurveRow) -> Choice:

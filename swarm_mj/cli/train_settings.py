@@ -21,6 +21,7 @@ from swarm_mj.cli.mission_options import (
 from swarm_mj.cli.options import Given, Option, flags_of
 from swarm_mj.learning.settings import (
     ORDERLY_SILENCE,
+    USUAL_HORIZON,
     PpoSettings,
     Training,
     usual_index_settings,
@@ -128,6 +129,7 @@ def asked_settings(
             own = _usual_silence(own, training) | own
     if others and training.credit_assignment == "robot":
         own = {"credit_scaling": "kind"} | own
+    ppo = _usual_horizon(training, ppo) | ppo
     training = replace(
         training,
         groups=_num_groups(missions, num_kinds),
@@ -180,6 +182,15 @@ def _usual_silence(own: Given, training: Training) -> Given:
     if training.credit_assignment == "robot" and is_ours and has_turns(features):
         return {"silence_logit": ORDERLY_SILENCE}
     return {}
+
+
+def _usual_horizon(training: Training, ppo: Given) -> Given:
+    """Return the horizon of credits that suits the discount and the rollouts that were given."""
+    asked = replace(training.ppo, **{"horizon": 1} | ppo)
+    if training.credit_assignment == "team" or asked.discount > 0.0:
+        return {"horizon": 1}
+    # In the last windows of a rollout no horizon is whole, so nothing is learned of them.
+    return {"horizon": min(USUAL_HORIZON, max(1, asked.num_steps // 2))}
 
 
 def _missions(asked: Given, num_robots: int) -> tuple[Mission, ...]:

@@ -1,17 +1,18 @@
-"""A robot's own credit: what a window's gain would have lost had the robot stayed silent.
+"""A robot's own credit: what its team's gain would have lost had the robot stayed silent.
 
-The difference reward of Wolpert and Tumer (2001): the window is replayed without the robot, through
+The difference reward of Wolpert and Tumer (2001): a window is replayed without the robot, through
 the same channel and by the same protocol. Its sum has the gradient of the team's gain, and a silent
 robot's credit is 0. Replayed with a packet that a silent robot did not send, the window tells what
 it would have been worth (as in Foerster et al., 2018, where a critic guesses it).
 
-News matter for longer than a window: they are passed on, and nobody hears the same again soon. So
-both ways of the window may be followed over those after it, in which everyone hears whom it heard.
+News matters for longer than a window: it is passed on, and who has it need not hear it again soon.
+So both courses of a window may be followed through those after it, in which everyone decodes whom
+it did in fact. That is an approximation: robots that knew less would have decided otherwise.
 """
 
 import copy
 from collections.abc import Sequence
-from typing import NamedTuple, TypeVar
+from typing import Literal, NamedTuple, TypeVar
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -24,29 +25,37 @@ from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
 Kind = TypeVar("Kind", bound=Channel | VaryingChannel)
-Heard = Int[np.ndarray, "_ N"]  # whom each robot decodes, itself if none; a row for each window
+End = Literal["over", "cut"]  # cut: the mission would have gone on
 
 
-class PlayedWindow(NamedTuple):
+class ReplayedWindow(NamedTuple):
     """A window of B missions as it was, and as it would have been had one robot acted otherwise."""
 
     timestamp: Float[np.ndarray, "B N N"]  # T before it [windows]
     after: Float[np.ndarray, "B N N"]  # T after it [windows]
     now: Float[np.ndarray, "B"]  # its start [windows]
     is_active: Bool[np.ndarray, "B N"]  # robots that have not failed
-    heard: Heard  # in the first slot, [B N]
-    heard_answer: Heard  # in the second one, [B N]
-    # R robots that speak or might have spoken.
+    # Whom each robot decodes in both slots, itself if none.
+    heard: Int[np.ndarray, "B N"]
+    heard_answer: Int[np.ndarray, "B N"]
+    # R robots that speak or might have spoken, and whom all decode if one of them acts otherwise.
     mission: Int[np.ndarray, "R"]
     robot: Int[np.ndarray, "R"]
     spoke: Bool[np.ndarray, "R"]  # whether it spoke, and otherwise is silent, or the reverse
-    otherwise: Heard  # whom all hear in the first slot if this one acts otherwise, [R N]
-    otherwise_answer: Heard  # likewise in the second, [R N]
-    is_last: bool  # of its missions
+    otherwise_heard: Int[np.ndarray, "R N"]
+    otherwise_heard_answer: Int[np.ndarray, "R N"]
+    end: End | None  # of its missions, if they end with it
 
 
-def credits_over(windows: Sequence[PlayedWindow], horizon: int) -> Float[np.ndarray, "S B N"]:
-    """Return the age that the team would not have lost in some windows without each robot.
+class Credits(NamedTuple):
+    """What each robot's packet, sent or only considered, was worth to its team in S windows."""
+
+    credit: Float[np.ndarray, "S B N"]
+    is_whole: Bool[np.ndarray, "S"]  # whether all of the horizon was flown, or the mission ended
+
+
+def credits_over(windows: Sequence[ReplayedWindow], horizon: int) -> Credits:
+    """Return by how much the team's age would be higher without each robot's packet.
 
     Args:
         windows: S windows one after the other; missions may end in between, and others begin.
@@ -54,18 +63,26 @@ def credits_over(windows: Sequence[PlayedWindow], horizon: int) -> Float[np.ndar
             the end of a mission, or of what was flown.
 
     Returns:
-        The credit of each robot's packet, sent or only considered, [S, B, N], summed over pairs of
-        robots and windows [windows]; it may be negative. Of silence it is 0.
+        The credits, summed over pairs of robots and windows [windows]; they may be negative. Of
+        silence they are 0.
     """
-    credit = np.zeros((len(windows), *windows[0].now.shape, windows[0].timestamp.shape[1]))
+    num_windows = len(windows)
+    credit = np.zeros((num_windows, *windows[0].timestamp.shape[:2]))
+    is_whole = np.zeros(num_windows, np.bool_)
     after = np.stack([window.after for window in windows])
     now = np.stack([window.now for window in windows])
     is_active = np.stack([window.is_active for window in windows])
     heard = np.stack([window.heard for window in windows])
     heard_answer = np.stack([window.heard_answer for window in windows])
-    ends = [n + 1 for n, window in enumerate(windows) if window.is_last]
-    for first, window in enumerate(windows):
-        stop = min([first + horizon, len(windows), *[end for end in ends if end > first]])
+    beyond = num_windows  # the first window that another mission has, or that was not flown
+    is_over = False  # whether there is nothing more of the mission
+    for first in reversed(range(num_windows)):
+        window = windows[first]
+        if window.end is not None:
+            beyond = first + 1
+            is_over = window.end == "over"
+        stop = min(first + horizon, beyond)
+        is_whole[first] = is_over or stop == first + horizon
         lost = np.zeros(len(window.robot))
         _follow(
             timestamp=window.timestamp,
@@ -75,15 +92,16 @@ def credits_over(windows: Sequence[PlayedWindow], horizon: int) -> Float[np.ndar
             heard=heard[first:stop],
             heard_answer=heard_answer[first:stop],
             mission=window.mission,
-            otherwise=window.otherwise,
-            otherwise_answer=window.otherwise_answer,
+            otherwise_heard=window.otherwise_heard,
+            otherwise_heard_answer=window.otherwise_heard_answer,
             lost=lost,
         )
-        credit[first, window.mission, window.robot] = np.where(window.spoke, lost, 0.0 - lost)
-    return credit
+        gained = 0.0 - lost  # without the sign of -0.0
+        credit[first, window.mission, window.robot] = np.where(window.spoke, lost, gained)
+    return Credits(credit=credit, is_whole=is_whole)
 
 
-def play_otherwise(
+def replay_otherwise(
     timestamp: Float[np.ndarray, "B N N"],
     position_m: Float[np.ndarray, "B N 2"],
     recipient: Int[np.ndarray, "B N"],
@@ -91,20 +109,20 @@ def play_otherwise(
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None = None,
     considered: Int[np.ndarray, "B N"] | None = None,
-    is_last: bool = False,
-) -> PlayedWindow:
-    """Play a window again, and once for each robot that speaks or might have spoken.
+    end: End | None = None,
+) -> ReplayedWindow:
+    """Replay a window as it was, and once for each robot that speaks or might have spoken.
 
     Args:
-        timestamp: T at the end of the window before [windows], [B N N].
-        position_m: Where the robots are, [B N 2].
-        recipient: Whom each robot addresses, [B N]; itself is silence.
+        timestamp: T at the end of the window before [windows], [B, N, N].
+        position_m: Where the robots are, [B, N, 2].
+        recipient: Whom each robot addresses, [B, N]; itself is silence.
         channel: A `snapshot_channel` from before the window.
         now: The start of the window [windows], [B].
-        is_active: Robots that have not failed, [B N]; without it, all count.
-        considered: Whom each robot might have addressed, [B N]: who does speak, its recipient, and
+        is_active: Robots that have not failed, [B, N]; without it, all count.
+        considered: Whom each robot might have addressed, [B, N]: who does speak, its recipient, and
             others anyone, or themselves. Without it, `recipient`.
-        is_last: Whether the missions end with it.
+        end: Of the missions, if they end with it.
 
     Returns:
         What was heard, and what would have been.
@@ -123,13 +141,13 @@ def play_otherwise(
     mission, robot = np.nonzero(otherwise != recipient)
     world = _World(position_m=position_m, channel=channel, now=now, is_active=is_active)
     if isinstance(channel, (FreeSpaceRadio, VaryingChannel)):
-        heard, heard_answer = _played_at_once(world, recipient, otherwise)
+        heard, heard_answer = _decoded_at_once(world, recipient, otherwise)
     else:
-        heard, heard_answer = _played_in_turn(world, recipient, otherwise)
+        heard, heard_answer = _decoded_in_turn(world, recipient, otherwise)
     num_missions = len(recipient)
     after = timestamp.copy()
     _merge_windows(after, now, heard, heard_answer)
-    return PlayedWindow(
+    return ReplayedWindow(
         timestamp=timestamp,
         after=after,
         now=now.copy(),
@@ -139,21 +157,23 @@ def play_otherwise(
         mission=mission,
         robot=robot,
         spoke=recipient[mission, robot] != robot,
-        otherwise=heard[num_missions:],
-        otherwise_answer=heard_answer[num_missions:],
-        is_last=is_last,
+        otherwise_heard=heard[num_missions:],
+        otherwise_heard_answer=heard_answer[num_missions:],
+        end=end,
     )
 
 
 class _World(NamedTuple):
-    """In what windows of B missions are played."""
+    """The places, the channel and the clock in which windows of B missions are replayed."""
 
     position_m: Float[np.ndarray, "B N 2"]
     channel: Channel | VaryingChannel
     now: Float[np.ndarray, "B"]
     is_active: Bool[np.ndarray, "B N"] | None
 
-    def play(self, mission: Int[np.ndarray, "W"], recipient: Heard) -> tuple[Heard, Heard]:
+    def decoded(
+        self, mission: Int[np.ndarray, "W"], recipient: Int[np.ndarray, "W N"]
+    ) -> tuple[Int[np.ndarray, "W N"], Int[np.ndarray, "W N"]]:
         """Return who decodes whom in both slots of W windows, each of one of the missions."""
         channel = snapshot_channel(self.channel)
         position_m = self.position_m[mission]
@@ -169,10 +189,10 @@ class _World(NamedTuple):
         return heard, heard_answer
 
 
-def _played_at_once(
+def _decoded_at_once(
     world: _World, recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"]
-) -> tuple[Heard, Heard]:
-    """Return what is heard in the windows as they were, and then in those of robots, one by one.
+) -> tuple[Int[np.ndarray, "W N"], Int[np.ndarray, "W N"]]:
+    """Return who decodes whom in the windows as they were, and then in those of robots, one by one.
 
     All of them are rows of one batch, which is ten times faster than one after the other.
     """
@@ -180,13 +200,13 @@ def _played_at_once(
     others = recipient[mission]  # a row for each robot that acts otherwise
     others[np.arange(robot.size), robot] = otherwise[mission, robot]
     rows = np.concatenate([np.arange(len(recipient)), mission])
-    return world.play(rows, np.concatenate([recipient, others]))
+    return world.decoded(rows, np.concatenate([recipient, others]))
 
 
-def _played_in_turn(
+def _decoded_in_turn(
     world: _World, recipient: Int[np.ndarray, "B N"], otherwise: Int[np.ndarray, "B N"]
-) -> tuple[Heard, Heard]:
-    """Play B missions at a time: a user's channel meets them as in flight, draws included."""
+) -> tuple[Int[np.ndarray, "W N"], Int[np.ndarray, "W N"]]:
+    """Replay B missions at a time: a user's channel meets them as in flight, draws included."""
     num_missions = len(recipient)
     missions = np.arange(num_missions)
     differs = otherwise != recipient
@@ -194,9 +214,9 @@ def _played_in_turn(
     row = np.cumsum(differs).reshape(differs.shape) - 1 + num_missions
     heard = np.empty((num_missions + differs.sum(), recipient.shape[1]), np.int64)
     heard_answer = heard.copy()
-    heard[:num_missions], heard_answer[:num_missions] = world.play(missions, recipient)
+    heard[:num_missions], heard_answer[:num_missions] = world.decoded(missions, recipient)
     for n in range(1, int(turn.max(initial=0)) + 1):
-        its = world.play(missions, np.where(turn == n, otherwise, recipient))
+        its = world.decoded(missions, np.where(turn == n, otherwise, recipient))
         mission, robot = np.nonzero(turn == n)
         heard[row[mission, robot]] = its[0][mission]
         heard_answer[row[mission, robot]] = its[1][mission]
@@ -213,8 +233,8 @@ def snapshot_channel(channel: Kind) -> Kind:
 def _merge_windows(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
-    heard: Heard,
-    heard_answer: Heard,
+    heard: Int[np.ndarray, "B N"],
+    heard_answer: Int[np.ndarray, "B N"],
 ) -> None:
     """Pass T of B missions through a window, by who decodes whom in its two slots."""
     packet = np.empty(timestamp.shape[1:])
@@ -245,19 +265,19 @@ def _follow(
     heard: Int[np.ndarray, "S B N"],
     heard_answer: Int[np.ndarray, "S B N"],
     mission: Int[np.ndarray, "R"],
-    otherwise: Heard,
-    otherwise_answer: Heard,
+    otherwise_heard: Int[np.ndarray, "R N"],
+    otherwise_heard_answer: Int[np.ndarray, "R N"],
     lost: Float[np.ndarray, "R"],
 ) -> None:
-    """Follow each window that is otherwise; write by how much ages are higher, in all windows."""
+    """Follow each window that is otherwise; add up in `lost` by how much ages are higher."""
     other = np.empty(timestamp.shape[1:])
     packet = np.empty(timestamp.shape[1:])
     for r in range(len(mission)):
         b = mission[r]
         other[...] = timestamp[b]
         for n in range(len(now)):
-            first = otherwise[r] if n == 0 else heard[n, b]
-            second = otherwise_answer[r] if n == 0 else heard_answer[n, b]
+            first = otherwise_heard[r] if n == 0 else heard[n, b]
+            second = otherwise_heard_answer[r] if n == 0 else heard_answer[n, b]
             _merge_slot(other, packet, now[n, b] + SLOT_WINDOWS, first)
             _merge_slot(other, packet, now[n, b] + 2 * SLOT_WINDOWS, second)
             risen, is_same = _risen(after[n, b], other, is_active[n, b])

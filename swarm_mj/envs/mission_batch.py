@@ -12,9 +12,11 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.envs.credit import (
-    PlayedWindow,
+    Credits,
+    End,
+    ReplayedWindow,
     credits_over,
-    play_otherwise,
+    replay_otherwise,
     snapshot_channel,
 )
 from swarm_mj.mission import Mission
@@ -120,31 +122,31 @@ class MissionBatch:
         """
         recipient = checked_robots("recipient", recipient, self.shape)
         if self.reward == "credit":
-            return self.credits_over([self.play(recipient)], horizon=1)[0]
+            return self.mean_credits([self.fly_for_credit(recipient)], horizon=1).credit[0]
         cost = BY_REWARD[self.reward].of_window(self.fly(recipient))
         if cost is None:
             raise ValueError(f"reward {self.reward} needs a task that has a cost")
         return np.broadcast_to(-cost[:, None], recipient.shape)
 
-    def play(
+    def fly_for_credit(
         self,
         recipient: Int[np.ndarray, "B N"],
         considered: Int[np.ndarray, "B N"] | None = None,
-    ) -> PlayedWindow:
-        """Fly a window as `step` does, and play it again as it might have been.
+    ) -> ReplayedWindow:
+        """Fly a window as `step` does, and replay it as it might have been.
 
         Args:
             recipient: Whom each robot addresses, [B, N], from 0 to N - 1.
-            considered: Whom it might have addressed, where it is silent; see `play_otherwise`.
+            considered: Whom it might have addressed, where it is silent; see `replay_otherwise`.
 
         Returns:
-            What `credits_over` takes.
+            What `mean_credits` takes.
 
         Raises:
             ValueError: As `step` does.
         """
         swarm = self.flown
-        # The window is played again, so that needs T and the channel's draws from before it.
+        # The window is replayed, which takes T and the channel's draws from before it.
         before = swarm.buffers.timestamp.copy()
         # The first news of a teammate lowers the age by the few windows flown, and a robot that
         # waits for more loses nothing: so it may count for more.
@@ -152,7 +154,7 @@ class MissionBatch:
         start = swarm.now
         channel = snapshot_channel(swarm.channel)
         self.fly(recipient)
-        return play_otherwise(
+        return replay_otherwise(
             before,
             swarm.states.position_m,
             recipient,
@@ -160,14 +162,13 @@ class MissionBatch:
             now=start,
             is_active=swarm.states.is_active,
             considered=considered,
-            is_last=self.is_over,
+            end=self._end,
         )
 
-    def credits_over(
-        self, windows: Sequence[PlayedWindow], horizon: int
-    ) -> Float[np.ndarray, "S B N"]:
-        """Return robots' credits as `credit.credits_over` does, as means over pairs [windows]."""
-        return credits_over(windows, horizon) / self.mission.num_robots**2  # sizes count alike
+    def mean_credits(self, windows: Sequence[ReplayedWindow], horizon: int) -> Credits:
+        """Return robots' credits as `credits_over` does, but as means over pairs [windows]."""
+        found = credits_over(windows, horizon)
+        return found._replace(credit=found.credit / self.mission.num_robots**2)  # sizes count alike
 
     def fly(self, recipient: Int[np.ndarray, "B N"]) -> WindowCosts:
         """Fly a window as `step` does, without computing rewards.
@@ -218,6 +219,13 @@ class MissionBatch:
     def is_over(self) -> bool:
         """True after the last window."""
         return bool(self.flown.now[0] >= self.last_window)
+
+    @property
+    def _end(self) -> End | None:
+        """How missions end now, if they do."""
+        if not self.is_over:
+            return None
+        return "cut" if self.last_window < self.mission.num_windows else "over"
 
     @property
     def is_active(self) -> Bool[np.ndarray, "B N"]:

@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
-from swarm_mj.envs.credit import PlayedWindow
+from swarm_mj.envs.credit import ReplayedWindow
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
 from swarm_mj.envs.vec_env import SwarmVecEnv
 from swarm_mj.learning.credit_scale import CreditScale
@@ -23,18 +23,22 @@ from swarm_mj.policies.gnn.own_networks import empty_network
 from swarm_mj.protocol.buffers import NO_PARENT
 
 
-class Credits(NamedTuple):
-    """What the packets of S windows, sent or only considered, were worth to each of E robots."""
+class RowCredits(NamedTuple):
+    """What each of E robots' packet, sent or only considered, was worth to its team in S windows.
 
-    credit: Float[np.ndarray, "S E"]  # over the number of pairs, and by its scale if it has one
-    is_whole: Bool[np.ndarray, "S E"]  # whether their horizon was flown, or the mission's end
+    Means over pairs [windows], divided by their kind's scale if credits are scaled.
+    """
+
+    credit: Float[np.ndarray, "S E"]
+    is_whole: Bool[np.ndarray, "S E"]  # whether all of the horizon was flown, or the mission ended
 
 
 class GraphVecEnv(SwarmVecEnv):
     """Environments for PPO over the Aggregation GNN, per robot or per team by its credit.
 
     Per robot, the reward is the robot's credit, over the number of pairs, and then by what credits
-    of its kind of mission usually are if they are scaled. Per team, it is the
+    of its kind of mission usually are if they are scaled; where packets are considered, it is 0,
+    and `take_credits` returns the credits. Per team, it is the
     negative mean age of information over the mission's duration, or the negative velocity
     variance, as in Fig. 6. Smaller teams are padded: per team with robots that do not exist, which
     are silent and see nothing.
@@ -42,9 +46,8 @@ class GraphVecEnv(SwarmVecEnv):
     Attributes:
         recalls: Asks what the network remembers since its last decision, [E *robots H]; None unless
             it has a memory.
-        considers: Asks whom robots might have addressed in their last decision, [E], where those
-            packets are to have credits as well, which `take_credits` returns, and rewards are 0;
-            None where they are not.
+        considers: Asks whom robots might have addressed in their last decision, [E], if those
+            packets are to have credits as well; None if not.
     """
 
     recalls: Callable[[], np.ndarray] | None = None
@@ -58,6 +61,8 @@ class GraphVecEnv(SwarmVecEnv):
         self.rng = rng
         self.agent = training.credit_assignment
         self.batches = _make_batches(training)
+        # Of each batch: its windows of late, whose credits have not been taken.
+        self._windows: list[list[ReplayedWindow]] = [[] for _ in self.batches]
         # A scale for each kind of mission, which its batches share; none if credits are not scaled.
         num_scales = len(training.kinds) if training.credit_scaling == "kind" else 0
         self.credit_scales = [CreditScale() for _ in range(num_scales)]
@@ -91,8 +96,6 @@ class GraphVecEnv(SwarmVecEnv):
         else:
             action = spaces.MultiDiscrete([self.num_nodes] * self.num_nodes)
         super().__init__(self.batches, self.agent, spaces.Dict(seen), action)
-        # Of each batch: its windows of late, whose credits have not been taken.
-        self._played: list[list[PlayedWindow]] = [[] for _ in self.batches]
 
     @property
     def num_teams(self) -> int:
@@ -103,6 +106,7 @@ class GraphVecEnv(SwarmVecEnv):
         """Start the missions under way over; others would shift the seeds of all that follow."""
         for batch in self.batches:
             batch.restart(batch.seeds, batch.last_window)
+        self._forget_windows()
         if self.memory is not None:
             self.memory[:] = 0.0
         return self._observe()
@@ -119,7 +123,12 @@ class GraphVecEnv(SwarmVecEnv):
             batch.restart(its_seeds, last_window)
             for recipient in flown.astype(np.int64):
                 batch.fly(recipient)
+        self._forget_windows()
         return self._observe()
+
+    def _forget_windows(self) -> None:
+        for windows in self._windows:
+            windows.clear()
 
     def step_wait(self) -> VecEnvStepReturn:
         """Fly one window; robots remember what they did when they decided on it."""
@@ -132,22 +141,22 @@ class GraphVecEnv(SwarmVecEnv):
                 reward[envs] = scale.divided(reward[envs])
         return seen, reward, done, infos
 
-    def take_credits(self, horizon: int) -> Credits:
+    def take_credits(self, horizon: int) -> RowCredits:
         """Return the credits of the windows flown since they were last taken; see `considers`."""
-        num_windows = len(self._played[0])
+        num_windows = len(self._windows[0])
         credit = np.zeros((num_windows, self.num_envs), np.float32)
         is_whole = np.zeros(credit.shape, np.bool_)
-        for n, (batch, envs) in enumerate(zip(self.batches, self._envs, strict=True)):
-            its = batch.credits_over(self._played[n], horizon).astype(np.float32)
-            for window, row in enumerate(its.reshape(num_windows, -1)):
-                if self.credit_scales:
-                    row = self.credit_scales[n % len(self.credit_scales)].divided(row)
-                credit[window, envs] = row
-            lasts = [window for window, played in enumerate(self._played[n]) if played.is_last]
-            num_whole = max([num_windows - horizon, *lasts]) + 1
-            is_whole[: max(0, num_whole), envs] = True
-            self._played[n].clear()
-        return Credits(credit=credit, is_whole=is_whole)
+        for batch, windows, envs in zip(self.batches, self._windows, self._envs, strict=True):
+            its = batch.mean_credits(windows, horizon)
+            credit[:, envs] = its.credit.reshape(num_windows, -1)
+            is_whole[:, envs] = its.is_whole[:, None]
+            windows.clear()
+        for window in range(num_windows):  # outside: a scale forgets by windows, not by batches
+            for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
+                # A part of a horizon, of which nothing is learned, would make the scale too small.
+                if is_whole[window, envs.start]:
+                    credit[window, envs] = scale.divided(credit[window, envs])
+        return RowCredits(credit=credit, is_whole=is_whole)
 
     def _fly(
         self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
@@ -155,7 +164,8 @@ class GraphVecEnv(SwarmVecEnv):
         if self.considers is None:
             return batch.step(recipient)
         considered = self.considers()[envs].reshape(batch.shape)
-        self._played[self._envs.index(envs)].append(batch.play(recipient, considered))
+        its = self.batches.index(batch)
+        self._windows[its].append(batch.fly_for_credit(recipient, considered))
         return np.zeros(batch.shape)
 
     def _begin(self, n: int) -> None:

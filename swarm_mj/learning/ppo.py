@@ -17,7 +17,7 @@ from stable_baselines3.common.vec_env import VecEnv, VecNormalize
 from torch import Tensor
 from torch.optim.swa_utils import AveragedModel
 
-from swarm_mj.learning.graph_vec_env import Credits, GraphVecEnv
+from swarm_mj.learning.graph_vec_env import GraphVecEnv, RowCredits
 from swarm_mj.learning.settings import Device, PpoSettings, Training
 from swarm_mj.policies.gnn.decisions import evaluated, recipient_logits
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
@@ -379,13 +379,14 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
     """
 
     considers: Callable[[], Considered]
-    takes_credits: Callable[[], Credits]
+    takes_credits: Callable[[], RowCredits]
 
     def reset(self) -> None:
         """Begin a rollout."""
         super().reset()
         self.weights = np.ones_like(self.rewards)
         self.done_log_probs = np.zeros_like(self.rewards)
+        self.is_whole = np.zeros(self.rewards.shape, np.bool_)
 
     def add(
         self,
@@ -404,9 +405,11 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
         super().add(obs, action, reward, episode_start, value, log_prob)
 
     def compute_returns_and_advantage(self, last_values: object, dones: np.ndarray) -> None:
-        """Returns are credits, and so are advantages, by their weights; values count for nothing."""
+        """Take credits for returns, and times their weights for advantages; values do not count."""
         del last_values, dones
-        self.rewards[...], self.is_whole = self.takes_credits()
+        found = self.takes_credits()
+        self.rewards[...] = found.credit
+        self.is_whole[...] = found.is_whole
         self.advantages[...] = self.rewards * self.weights
         self.returns[...] = self.rewards
 

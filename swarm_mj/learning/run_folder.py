@@ -245,14 +245,16 @@ def _with_replays(
 def rollout_bytes(training: Training) -> int:
     """Return the size of a run's largest arrays: the rollout, and the robots' packet memory.
 
-    And of T before and after each window, of which credits are made, and a copy of the latter.
+    And of what credits are made of, window by window: T before and after it, and whom all robots
+    decode in both slots if a robot acts otherwise, which is at most once for each of them; and of
+    the copies of one of these that are made meanwhile.
     """
     nodes = training.most_robots
     rows = training.missions * nodes  # a graph each
     graph = nodes * (4 * training.network.num_features + 4 + 1)  # features, parent, may address
     remembered = 4 * nodes**2 if remembers_packets(training.features) else 0
-    played = 3 * 8 * nodes * training.ppo.num_steps if training.considers_speech else 0
-    return rows * (graph * (training.ppo.num_steps + 1) + remembered + played)
+    replayed = 5 * 8 * nodes * training.ppo.num_steps if training.considers_speech else 0
+    return rows * (graph * (training.ppo.num_steps + 1) + remembered + replayed)
 
 
 def passes_bytes(training: Training) -> float:

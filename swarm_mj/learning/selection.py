@@ -234,7 +234,10 @@ def reference_ages(row: Mapping[str, float]) -> dict[str, float]:
 
 
 def reached(curve: Sequence[CurveRow], name: str) -> CurveRow | None:
-    """Return the first evaluation whose age was at most that of one of `COMPARED`, if any was."""
+    """Return the first evaluation whose age was at most that of one of `COMPARED`, if any was.
+
+    None, too, if that one was not flown.
+    """
     for row in curve:
         age = reference_ages(row.references).get(name)
         if age is not None and row.costs.aoi <= age:

@@ -34,6 +34,7 @@ EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as sp
 USUAL_SILENCE = 5.5  # training begins with one of 40 robots in seven speaking
 # Where an order of turns lets a robot speak, the others begin all but silent.
 ORDERLY_SILENCE = 7.0
+USUAL_HORIZON = 16  # [windows]
 TRAIN_WINDOWS = (40, 250)  # long missions and short ones should end well alike
 # A generation is thousands of decisions, so an evaluation every 10,000 would follow each of them.
 INDEX_EVALUATED_EVERY = 200_000
@@ -54,8 +55,8 @@ class PpoSettings:
         num_minibatches: Into how many a rollout is divided.
         num_epochs: Passes over a rollout.
         horizon: Over how many windows a packet's credit is summed up, its own included; at most
-            `num_steps`, and 1 with a discount.
-        discount: Gamma; 0 pays a packet by its credit alone, and nothing that comes later.
+            `num_steps`.
+        discount: Gamma; 0 pays a packet its own credit alone, not what later packets earn.
         gae_lambda: Lambda of the generalised advantage estimate.
         clip: By how much the probability ratio may differ from 1.
         clips_value: Whether values are clipped by the same number.
@@ -97,19 +98,20 @@ class PpoSettings:
         10, "into how many a rollout is divided", label="minibatches", low=1, high=10**6
     )
     num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
-    # News are passed on, and spare others to say the same: what they are worth shows later.
+    # News is passed on, and spares others repeating it: its worth shows later. Runs whose settings
+    # say nothing of it had a horizon of 1.
     horizon: int = setting(
-        16,
-        "windows over which a packet's credit is summed up, from its own on; at most "
-        "--rollout-windows",
+        1,
+        "windows over which a packet's credit is summed up, from its own on",
         label="credit-horizon",
         flag="--credit-horizon",
+        shown=f"{USUAL_HORIZON}, at most half a rollout; 1 with a discount, team: 1",
         low=1,
         high=100_000,
     )
     discount: float = setting(
         0.0,
-        "gamma; 0: a packet is paid its credit alone, and nothing that comes later",
+        "gamma; 0: a packet earns its own credit alone, not what later packets earn",
         low=0.0,
         high=1.0,
     )
@@ -125,11 +127,6 @@ class PpoSettings:
 
     def __post_init__(self) -> None:
         check(self)
-        if self.discount > 0.0 and self.horizon > 1:
-            raise ValueError(
-                f"credit-horizon {self.horizon} takes no discount, not {self.discount:g}; choose "
-                "--credit-horizon 1, or --discount 0"
-            )
         if self.horizon > self.num_steps:
             raise ValueError(
                 f"credit-horizon {self.horizon} is longer than a rollout; choose at most "
@@ -167,7 +164,6 @@ PAPER_TEAM_PPO = PpoSettings(
     num_steps=4,
     num_minibatches=2,  # of 64
     num_epochs=4,
-    horizon=1,
     discount=0.99,
     gae_lambda=0.95,
     clip=0.1,
@@ -357,14 +353,23 @@ class Training:
             raise ValueError(
                 f"train-windows must be one number, or the least and the most: {given}"
             )
+        self._check_credit()
+        for other in self.other_missions:
+            self._check_beside(other)
+
+    def _check_credit(self) -> None:
+        """Raise ValueError for what does not go with the credit assignment."""
         if self.credit_assignment == "robot" and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is a team's; choose credit team, or reward aoi")
+        if self.ppo.horizon > 1 and not self.considers_speech:
+            raise ValueError(
+                "credit-horizon sums up credits per robot, without a discount; choose credit robot "
+                f"and discount 0, or credit-horizon 1, not {self.ppo.horizon}"
+            )
         if self.credit_assignment == "team" and self.unknown_age > 0.0:
             raise ValueError("unknown-age counts in credits per robot; choose credit robot, or 0")
         if self.credit_assignment == "team" and self.credit_scaling != "none":
             raise ValueError("credit-scaling is of credits per robot; choose credit robot, or none")
-        for other in self.other_missions:
-            self._check_beside(other)
 
     def _check_beside(self, other: Mission) -> None:
         """Raise ValueError if a mission cannot be trained on together with the first."""
@@ -483,7 +488,7 @@ def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: i
     check_value(Training.__dataclass_fields__["credit_assignment"], credit)
     usual = Training(mission=mission, robots=tuple(robots), seed=seed)
     if credit == "robot":
-        return usual
+        return replace(usual, ppo=replace(usual.ppo, horizon=USUAL_HORIZON))
     is_reference = mission.preset == "reference"
     # III-C, or the authors' code: other features, and two numbers per node. Both have the code's
     # edges. Over the text's, which lead from children to parents, nothing of the robot itself

@@ -64,8 +64,9 @@ def test_without_options_a_run_has_the_usual_settings(credit):
         ("--receptive-field", 3, "network.receptive_field"),
         ("--edges", "reference", "network.edges"),
         ("--learning-rate", 0.5, "ppo.learning_rate"),
-        ("--discount", 0.75, "ppo.discount"),
-        ("--rollout-windows", 6, "ppo.num_steps"),
+        ("--entropy", 0.75, "ppo.entropy"),
+        ("--rollout-windows", 64, "ppo.num_steps"),
+        ("--credit-horizon", 6, "ppo.horizon"),
         ("--minibatches", 3, "ppo.num_minibatches"),
         ("--most-speech", 0.3, "most_speech"),
         ("--unknown-age", 25.0, "unknown_age"),
@@ -85,6 +86,22 @@ def test_every_option_reaches_its_setting_and_no_other(option, value, place):
         part = getattr(usual, owner) if owner else usual
         part = replace(part, **{its: value})
         assert changed == (replace(usual, **{owner: part}) if owner else part)
+
+
+@pytest.mark.parametrize(
+    ("options", "horizon"),
+    [
+        ((), 16),
+        (("--rollout-windows", 12), 6),
+        (("--rollout-windows", 1), 1),
+        (("--rollout-windows", 12, "--credit-horizon", 12), 12),
+        (("--discount", 0.75), 1),
+        (("--credit", "team"), 1),
+        (("--credit", "team", "--discount", 0), 1),
+    ],
+)
+def test_the_horizon_of_credits_suits_rollouts_and_discount(options, horizon):
+    assert asked(*options).ppo.horizon == horizon
 
 
 def test_missions_in_training_have_one_length_or_one_between_two():

@@ -1,6 +1,8 @@
 """A robot's credit is what its team would not have gained in a window without it."""
 
 import copy
+from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 import pytest
@@ -9,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from turns import settled
 
-from swarm_mj.envs.credit import credits_over, play_otherwise, snapshot_channel
+from swarm_mj.envs.credit import credits_over, replay_otherwise, snapshot_channel
 from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.protocol.window import window
@@ -72,8 +74,8 @@ def assert_rewards_are_those_of_a_replay(
         others = random_recipients(rng, batch.shape, also_considered)
         considered = np.where(silent, others, recipient)
         if also_considered:
-            played = batch.play(recipient, considered)
-            found = credits_over([played], horizon=1)[0]
+            played = batch.fly_for_credit(recipient, considered)
+            found = credits_over([played], horizon=1).credit[0]
         else:
             found = batch.step(recipient) * mission.num_robots**2
         expected = credits_by_replay(
@@ -177,7 +179,7 @@ def standing(position_m):
 
 def credits_of(*played, **its):
     """Those of one window alone."""
-    return credits_over([play_otherwise(*played, **its)], horizon=1)[0]
+    return credits_over([replay_otherwise(*played, **its)], horizon=1).credit[0]
 
 
 def test_who_destroys_a_packet_pays_for_it():
@@ -218,17 +220,17 @@ def test_news_count_until_they_would_have_come_anyway():
     windows = []
     for n, recipient in enumerate([speaks, silent, speaks, silent]):
         now = np.array([10.0 + n])
-        played = play_otherwise(timestamp, position_m, recipient, to_the_addressee, now)
+        played = replay_otherwise(timestamp, position_m, recipient, to_the_addressee, now)
         windows.append(played)
         timestamp = played.after
     told = (10.5 - 4.0) + (11.0 - 4.0)  # to 1, and its answer to 0
     for horizon, num_windows in ((1, 1), (2, 2), (3, 2), (4, 2)):
-        credit = credits_over(windows, horizon)
+        credit = credits_over(windows, horizon).credit
         # In the third window both hear of each other anyway, whatever was heard in the first.
         assert credit[0, 0, 0] == pytest.approx(num_windows * told), horizon
-    again = credits_over(windows, 2)[2, 0, 0]
+    again = credits_over(windows, 2).credit[2, 0, 0]
     assert again == pytest.approx(2 * ((12.5 - 10.5) + (13.0 - 11.0)))
-    assert np.all(credits_over(windows, 2)[:, 0, 1:] == 0.0)
+    assert np.all(credits_over(windows, 2).credit[:, 0, 1:] == 0.0)
 
 
 def merged(timestamp, heard, time):
@@ -243,7 +245,7 @@ def merged(timestamp, heard, time):
 
 
 def followed(timestamp, windows):
-    """T after each of some windows, of which starts and who decodes whom in both slots are given."""
+    """T after each of some windows, given their starts and who decodes whom in both slots."""
     found = []
     for now, slots in windows:
         for n, heard in enumerate(slots):
@@ -252,67 +254,96 @@ def followed(timestamp, windows):
     return np.array(found)
 
 
+class Flown(NamedTuple):
+    """A window as it was flown, and what a robot's doing otherwise made of it."""
+
+    now: np.ndarray
+    slots: list[np.ndarray]  # whom each robot decoded
+    known: np.ndarray  # T before it
+    active: np.ndarray
+    otherwise: dict[tuple[int, int], list[np.ndarray]]  # by mission and robot
+    spoke: np.ndarray
+
+
 @pytest.mark.parametrize(
-    "mission", [WALKING, FADED, FAILING], ids=["walking", "fades and losses", "robots that fail"]
+    ("mission", "channel"),
+    [(WALKING, None), (FADED, None), (WALKING, Lossy(WALKING)), (FAILING, None)],
+    ids=["walking", "fades and losses", "a channel that draws", "robots that fail"],
 )
-def test_over_a_horizon_later_windows_are_heard_as_they_were(mission):
+def test_over_a_horizon_later_windows_are_heard_as_they_were(mission, channel):
     """By the public protocol in a packet's own window, and by plain loops in those after it."""
-    batch = MissionBatch(mission, 2, features="paper", reward="credit", unknown_age=7.0)
+    components = Components(channel=channel)
+    batch = MissionBatch(mission, 2, reward="credit", components=components, unknown_age=7.0)
     rng = np.random.default_rng(1)
-    horizon, length = 5, 12
-    flown, played, known, otherwise = [], [], [], []
-    batch.restart([4, 2], last_window=length)
+    horizon = 5
+    flown, replayed = [], []
+    batch.restart([4, 2], last_window=12)
     while not batch.is_over:
         swarm, now = batch.flown, batch.flown.now.copy()
-        buffers, channel = copy.deepcopy(swarm.buffers), snapshot_channel(swarm.channel)
+        buffers, before = copy.deepcopy(swarm.buffers), snapshot_channel(swarm.channel)
         recipient = random_recipients(rng, batch.shape, 0.25)
         silent = recipient == np.arange(mission.num_robots)
         considered = np.where(silent, random_recipients(rng, batch.shape, 0.3), recipient)
-        played.append(batch.play(recipient, considered))
-        flown.append((now, [phase.heard for phase in swarm.phases]))
-        known.append(np.where(buffers.is_known, buffers.timestamp, -7.0))
-        its = {}
+        replayed.append(batch.fly_for_credit(recipient, considered))
+        slots = [phase.heard for phase in swarm.phases]
+        otherwise = {}
         for b, i in np.argwhere(considered != np.arange(mission.num_robots)).tolist():
             changed = recipient.copy()
             changed[b, i] = considered[b, i] if silent[b, i] else i
             states = settled(swarm.states, changed)
-            slots = window(copy.deepcopy(buffers), *states, copy.deepcopy(channel), now)
-            its[b, i] = ([phase.heard for phase in slots], -1.0 if silent[b, i] else 1.0)
-        otherwise.append((its, batch.is_active.copy()))
-    credit = credits_over(played, horizon)
-    num_lasting = 0
-    for n, (its, _) in enumerate(otherwise):
-        later = flown[n + 1 : n + horizon]
-        truth = followed(known[n], [flown[n], *later])
-        for (b, i), (slots, sign) in its.items():
-            other = followed(known[n], [(flown[n][0], slots), *later])
-            lost = 0.0
-            for window_after, (true_t, other_t) in enumerate(zip(truth, other, strict=True)):
-                active = otherwise[n + window_after][1][b]
-                pairs = active[:, None] & active[None, :]
-                lost += np.sum((true_t - other_t)[b] * pairs)
-            assert credit[n, b, i] == pytest.approx(sign * lost, abs=1e-9)
-            num_lasting += credit[n, b, i] != pytest.approx(
-                credits_over(played[n : n + 1], 1)[0, b, i]
-            )
-    assert num_lasting > 20
-    silent_rows = np.ones(credit.shape, bool)
-    for n, (its, _) in enumerate(otherwise):
-        for b, i in its:
-            silent_rows[n, b, i] = False
-    assert np.all(credit[silent_rows] == 0.0)
+            phases = window(copy.deepcopy(buffers), *states, copy.deepcopy(before), now)
+            otherwise[b, i] = [phase.heard for phase in phases]
+        known = np.where(buffers.is_known, buffers.timestamp, -7.0)
+        flown.append(Flown(now, slots, known, batch.is_active.copy(), otherwise, ~silent))
+    credit, alone = credits_over(replayed, horizon).credit, credits_over(replayed, 1).credit
+    expected = np.zeros(credit.shape)
+    for n, its in enumerate(flown):
+        later = flown[n : n + horizon]
+        after = followed(its.known, [(each.now, each.slots) for each in later])
+        for (b, i), slots in its.otherwise.items():
+            others = [(its.now, slots), *[(each.now, each.slots) for each in later[1:]]]
+            lost = after[:, b] - followed(its.known, others)[:, b]
+            for each, of_window in zip(later, lost, strict=True):
+                active = each.active[b]
+                counted = np.sum(of_window[np.ix_(active, active)])
+                expected[n, b, i] += counted if its.spoke[b, i] else -counted
+    np.testing.assert_allclose(credit, expected, atol=1e-9)
+    assert np.sum(~np.isclose(credit, alone)) > 20  # news lasts
 
 
 def test_a_horizon_ends_with_the_mission():
     """What the next mission's robots know was not lost by this one's packets."""
-    batch = MissionBatch(WALKING, 2, features="paper", reward="credit")
+    batch = MissionBatch(WALKING, 2, reward="credit")
     rng = np.random.default_rng(2)
     windows = []
     for seeds in ([4, 2], [3, 5]):
         batch.restart(seeds, last_window=4)
         for _ in range(4):
-            windows.append(batch.play(random_recipients(rng, batch.shape, 0.4)))
-    together = credits_over(windows, 3)
-    apart = [credits_over(part, 3) for part in (windows[:4], windows[4:])]
+            recipient = random_recipients(rng, batch.shape, 0.4)
+            windows.append(batch.fly_for_credit(recipient))
+    together = credits_over(windows, 3).credit
+    apart = [credits_over(part, 3).credit for part in (windows[:4], windows[4:])]
     np.testing.assert_array_equal(together, np.concatenate(apart))
     assert np.any(together[2:4] != 0.0)
+
+
+def test_a_credit_is_whole_if_it_is_that_of_the_mission_flown_on():
+    """A mission of 8 windows: cut off after 6 of them, and flown to its end."""
+    mission = replace(WALKING, num_windows=8)
+    batch = MissionBatch(mission, 2, reward="credit")
+    found = []
+    for last_window in (6, 8):
+        batch.restart([4, 2], last_window=last_window)
+        rng = np.random.default_rng(2)
+        windows = []
+        while not batch.is_over:
+            recipient = random_recipients(rng, batch.shape, 0.4)
+            windows.append(batch.fly_for_credit(recipient))
+        found.append(credits_over(windows, 3))
+    cut, over = found
+    assert cut.is_whole.tolist() == [True] * 4 + [False] * 2
+    assert over.is_whole.all()
+    same = np.all(cut.credit == over.credit[:6], axis=(1, 2))
+    np.testing.assert_array_equal(same, cut.is_whole)
+    stopped = credits_over(windows[:5], 3)  # there is no more of the mission yet
+    assert stopped.is_whole.tolist() == [True] * 3 + [False] * 2

@@ -23,7 +23,9 @@ def small_training(credit="robot", task="stationary", sizes=(5,), discount=None,
     """
     mission = paper(task, num_robots=sizes[0], num_windows=20, range_ratio=0.6)
     its = usual_settings(credit, mission, sizes, seed=3)
-    ppo = replace(its.ppo, num_steps=8, num_minibatches=3, num_epochs=2, horizon=1)
+    is_short_sighted = credit == "team" or (discount or 0.0) > 0.0
+    horizon = 1 if is_short_sighted else 3
+    ppo = replace(its.ppo, num_steps=8, num_minibatches=3, num_epochs=2, horizon=horizon)
     network = replace(its.network, latent=6, depth=2, receptive_field=1)
     if credit == "robot":
         network = replace(network, num_features=num_features("extended"))

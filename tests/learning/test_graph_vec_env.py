@@ -220,28 +220,35 @@ def test_batches_of_one_kind_share_its_scale():
     np.testing.assert_allclose([scale.count for scale in twice.credit_scales], counts)
 
 
+def kept_windows(batch):
+    """A list that is filled with the windows that a batch flies for their credits."""
+    flown = []
+    fly = batch.fly_for_credit
+    batch.fly_for_credit = lambda *given: flown.append(fly(*given)) or flown[-1]
+    return flown
+
+
+def scaled_by_hand(credit, total, count):
+    """A window's credits by the root mean square of those of their kind, which they change."""
+    total[...] = 0.999 * total + np.sum(credit**2)
+    count[...] = 0.999 * count + np.count_nonzero(credit)
+    return credit / np.sqrt(total / count) if count else credit
+
+
 @pytest.mark.parametrize("scaling", ["none", "kind"])
 def test_credits_taken_are_those_of_the_windows_flown_since(scaling):
-    """Of packets sent or only considered; whole where the horizon, or the mission's end, was."""
-    _, env = several_kinds(credit_scaling=scaling)
+    """Of packets sent or only considered; two batches of each kind share its scale, by hand."""
+    training, _ = several_kinds(credit_scaling=scaling)
+    env = GraphVecEnv(replace(training, groups=8), np.random.default_rng(1))
     horizon, length = 3, WINDOWS + 2
     rng = np.random.default_rng(2)
     asked = []
     env.considers = lambda: asked[-1]
-    played = [[] for _ in env.batches]
-
-    def watched(play, its):
-        def play_and_keep(*given):
-            its.append(play(*given))
-            return its[-1]
-
-        return play_and_keep
-
-    for batch, its in zip(env.batches, played, strict=True):
-        batch.play = watched(batch.play, its)
+    flown = [kept_windows(batch) for batch in env.batches]
+    total, count = np.zeros(4), np.zeros(4)
     env.reset()
     for _ in range(2):  # the second time, of what was flown after the first
-        for its in played:
+        for its in flown:
             its.clear()
         for _ in range(length):
             actions = drawn(env, rng)
@@ -252,23 +259,42 @@ def test_credits_taken_are_those_of_the_windows_flown_since(scaling):
         credit, is_whole = env.take_credits(horizon)
         assert credit.shape == is_whole.shape == (length, env.num_envs)
         considers = np.array(asked[-length:]) != own
-        assert np.any(credit[considers] < 0.0) and np.any(credit[considers] > 0.0)
+        assert np.any(credit[considers] < 0.0)
+        assert np.any(credit[considers] > 0.0)
         assert np.all(credit[~considers] == 0.0)
-        for n, (batch, envs) in enumerate(zip(env.batches, env._envs, strict=True)):
-            expected = credits_over(played[n], horizon) / batch.mission.num_robots**2
-            expected = expected.reshape(length, -1)
-            if scaling == "none":
-                np.testing.assert_allclose(credit[:, envs], expected, rtol=1e-6)
-            else:
-                assert credit[-1, envs].any()
-                scale = env.credit_scales[n]
-                factor = np.sqrt(scale.count / scale.total)  # as it is in the last window
-                np.testing.assert_allclose(credit[-1, envs], expected[-1] * factor, rtol=1e-5)
-            ends = [window.is_last for window in played[n]]
-            assert any(ends)
-            for window in range(length):
-                whole = window + horizon <= length or any(ends[window:])
-                assert np.all(is_whole[window, envs] == whole)
+        found = [credits_over(its, horizon) for its in flown]
+        for window in range(length):
+            for n, (batch, envs) in enumerate(zip(env.batches, env._envs, strict=True)):
+                its = found[n].credit[window].ravel() / batch.mission.num_robots**2
+                assert np.all(is_whole[window, envs] == found[n].is_whole[window])
+                if scaling == "kind" and found[n].is_whole[window]:
+                    its = scaled_by_hand(its, total[n % 4 : n % 4 + 1], count[n % 4 : n % 4 + 1])
+                np.testing.assert_allclose(credit[window, envs], its, rtol=1e-4, atol=1e-6)
+        assert 0 < np.sum(is_whole) < is_whole.size
+
+
+def test_windows_before_a_reset_have_no_credits():
+    _, env = several_kinds()
+    rng = np.random.default_rng(2)
+    asked = []
+    env.considers = lambda: asked[-1]
+
+    def fly(num_windows):
+        for _ in range(num_windows):
+            asked.append(drawn(env, rng))
+            env.step(asked[-1])
+
+    env.reset()
+    fly(3)
+    env.reset()
+    fly(5)
+    assert env.take_credits(2).credit.shape == (5, env.num_envs)
+    fly(3)
+    begun = [(batch.seeds, batch.last_window) for batch in env.batches]
+    seeds, last_windows = zip(*begun, strict=True)
+    env.replay(seeds, last_windows, [np.zeros((0, *batch.shape)) for batch in env.batches])
+    fly(4)
+    assert env.take_credits(2).credit.shape == (4, env.num_envs)
 
 
 def mean_age(swarm, b):

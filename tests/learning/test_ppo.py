@@ -13,7 +13,7 @@ from stable_baselines3.common.buffers import DictRolloutBuffer
 from stable_baselines3.common.callbacks import BaseCallback
 from stable_baselines3.common.vec_env import VecNormalize
 
-from swarm_mj.learning.graph_vec_env import Credits, env_of
+from swarm_mj.learning.graph_vec_env import RowCredits, env_of
 from swarm_mj.learning.ppo import (
     Considered,
     SpeechRolloutBuffer,
@@ -264,7 +264,7 @@ def filled(speaks):
     credit = np.arange(STEPS * ROWS, dtype=np.float32).reshape(STEPS, ROWS)
     is_whole = np.arange(STEPS) < STEPS - 1
     whole_rows = np.tile(is_whole[:, None], ROWS)
-    buffer.takes_credits = lambda: Credits(credit=credit, is_whole=whole_rows)
+    buffer.takes_credits = lambda: RowCredits(credit=credit, is_whole=whole_rows)
     buffer.compute_returns_and_advantage(torch.zeros(ROWS), np.zeros(ROWS))
     return buffer
 
@@ -352,6 +352,24 @@ def test_a_run_says_how_many_packets_are_considered(share):
     assert np.all(buffer.rewards[~is_considered] == 0.0)
 
 
+@pytest.mark.parametrize("horizon", [1, 3])
+def test_a_rollouts_credits_are_over_the_horizon_of_the_settings(horizon):
+    model = make_model(with_ppo(small_training(silence_logit=2.0), horizon=horizon))
+    env = env_of(model)
+    flown = []
+    fly = env.batches[0].fly_for_credit
+    env.batches[0].fly_for_credit = lambda *given: flown.append(fly(*given)) or flown[-1]
+    model.train = lambda: None
+    model.learn(model.n_steps * model.n_envs)
+    found = env.batches[0].mean_credits(flown, horizon)
+    buffer = model.rollout_buffer
+    rows = env._envs[0]
+    expected = found.credit.reshape(model.n_steps, -1)
+    np.testing.assert_allclose(buffer.rewards[:, rows], expected, rtol=1e-6)
+    assert np.any(expected != 0.0)
+    np.testing.assert_array_equal(buffer.is_whole[:, rows].all(axis=1), found.is_whole)
+
+
 def test_what_flies_is_the_average_of_the_weights_after_each_rollout():
     """After the second rollout 2 of 11 parts are kept, then 3 of 12, but never more than asked."""
     training = with_ppo(small_training(), kept=0.2)
@@ -431,7 +449,7 @@ def advantages_by_hand(model, watch, e):
 @pytest.mark.parametrize("credit", ["robot", "team"])
 def test_nothing_leaks_over_the_end_of_a_mission(credit, monkeypatch):
     training = replace(small_training(credit), silence_logit=0.0)
-    changes = {"num_steps": LENGTH, "discount": DISCOUNT, "gae_lambda": GAE_LAMBDA}
+    changes = {"num_steps": LENGTH, "discount": DISCOUNT, "gae_lambda": GAE_LAMBDA, "horizon": 1}
     model, watch = one_rollout(with_ppo(training, **changes), monkeypatch)
     buffer, num_cut, num_over = model.rollout_buffer, 0, 0
     for e in range(model.n_envs):

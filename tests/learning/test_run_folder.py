@@ -1,12 +1,15 @@
 """A run's folder: its settings on disk, what may begin there, what kills leave, its size."""
 
+import itertools
 import json
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 import pytest
 from small_runs import small_training
 
+from swarm_mj.learning.graph_vec_env import env_of
 from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.run_folder import (
     CHECKPOINT,
@@ -140,13 +143,21 @@ def test_a_runs_own_parts_must_be_named(tmp_path):
 
 @pytest.mark.parametrize(("credit", "robots"), [("robot", 6), ("team", 6), ("robot", 40)])
 def test_a_rollout_is_of_the_arrays_that_are_made(credit, robots):
-    """With what robots remember of packets: at 40, more than the graph by which it exceeds them."""
+    """With what robots remember, and windows replayed for all robots, who might have spoken."""
     mission = paper("stationary", num_robots=robots, range_ratio=0.5)
     training = replace(usual_settings(credit, mission, (robots,)), missions=4)
-    buffer = make_model(training).rollout_buffer
-    made = sum(rows.nbytes for rows in buffer.observations.values())
+    model = make_model(training)
+    made = sum(rows.nbytes for rows in model.rollout_buffer.observations.values())
     if credit == "robot":
         made += sum(array.nbytes for array in empty_memory(4, robots))
+        env = env_of(model)
+        own = np.tile(np.arange(robots), 4)
+        env.considers = lambda: (own + 1) % robots
+        env.reset()
+        for _ in range(training.ppo.num_steps):
+            env.step(own)
+        for window in itertools.chain(*env._windows):
+            made += sum(array.nbytes for array in window if isinstance(array, np.ndarray))
     assert made < rollout_bytes(training) < 2.0 * made
 
 

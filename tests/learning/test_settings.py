@@ -12,7 +12,8 @@ from swarm_mj.mission import PRESETS, paper, reference
 from swarm_mj.policies.gnn.network import AggregationGnn
 from swarm_mj.system.reading import read_json
 
-CREDITS = [(credit, preset) for credit in ("robot", "team") for preset in PRESETS]
+CREDIT_WAYS = ("robot", "team")
+CREDITS = [(credit, preset) for credit in CREDIT_WAYS for preset in PRESETS]
 
 
 @pytest.mark.parametrize(("credit", "preset"), CREDITS)
@@ -67,18 +68,22 @@ def test_missions_of_training_have_at_most_the_windows_of_those_asked_for():
         assert (its.least_windows, its.most_windows) == (least, most)
 
 
-@pytest.mark.parametrize(
-    ("changes", "said"),
-    [
-        ({"num_steps": 4, "horizon": 5}, "credit-horizon 5 is longer than a rollout; choose at most 4"),
-        ({"discount": 0.5, "horizon": 2}, "credit-horizon 2 takes no discount, not 0.5"),
-    ],
-)  # fmt: skip
-def test_a_horizon_that_cannot_be_is_refused(changes, said):
-    with pytest.raises(ValueError, match=said):
-        PpoSettings(**changes)
+def test_a_horizon_that_cannot_be_is_refused():
     assert PpoSettings(num_steps=4, horizon=4).horizon == 4
-    assert PpoSettings(discount=0.5, horizon=1).discount == 0.5
+    with pytest.raises(ValueError, match="credit-horizon 5 is longer than a rollout; choose at m"):
+        PpoSettings(num_steps=4, horizon=5)
+    robot, team = (usual_settings(credit, paper("stationary"), (40,)) for credit in CREDIT_WAYS)
+    for training in (replace(robot, ppo=replace(robot.ppo, horizon=1, discount=0.5)), team):
+        longer = replace(training.ppo, horizon=2)
+        with pytest.raises(ValueError, match="credit-horizon sums up credits per robot, without a"):
+            replace(training, ppo=longer)
+
+
+def test_settings_that_say_nothing_of_a_horizon_had_none():
+    training = usual_settings("robot", paper("stationary"), (40,))
+    stored = asdict(training)
+    assert stored["ppo"].pop("horizon") > 1
+    assert read_json(json.dumps(stored), Training).ppo.horizon == 1
 
 
 def test_silence_is_dropped_only_where_it_earns_nothing():
