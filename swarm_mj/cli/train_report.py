@@ -89,12 +89,12 @@ def report(run: TrainingRun, progress: Progress) -> dict[str, str]:
         "policy kept": f"{_amount(choice.kept, cost)}, after {choice.decisions:,} decisions",
     }
     for name, each in choice.others.items():
-        told = _amount(each, cost)
+        shown = _amount(each, cost)
         if name in REFERENCES:
-            told += f"; {REFERENCES[name]}"
+            shown += f"; {REFERENCES[name]}"
         if name in selection.reference_ages(progress.curve[0].references):
-            told += f"; {_when_reached(progress, name)}"
-        rows[NAMES.get(name, name)] = told
+            shown += f"; {_when_reached(progress, name)}"
+        rows[NAMES.get(name, name)] = shown
     if ORACLE not in choice.others and training.most_robots > selection.ORACLE_ROBOTS:
         too_many = f"more than {selection.ORACLE_ROBOTS} robots"
         rows[ORACLE] = f"not flown: it would take long with {too_many}"

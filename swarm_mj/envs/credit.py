@@ -48,7 +48,7 @@ class ReplayedWindow(NamedTuple):
 
 
 class Credits(NamedTuple):
-    """What each robot's packet, sent or only considered, was worth to its team in S windows."""
+    """The worth to its team of each robot's packet, sent or only considered, in S windows."""
 
     credit: Float[np.ndarray, "S B N"]
     is_whole: Bool[np.ndarray, "S"]  # whether all of the horizon was flown, or the mission ended

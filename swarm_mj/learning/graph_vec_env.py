@@ -24,7 +24,7 @@ from swarm_mj.protocol.buffers import NO_PARENT
 
 
 class RowCredits(NamedTuple):
-    """What each of E robots' packet, sent or only considered, was worth to its team in S windows.
+    """The worth to its team of each of E robots' packet, sent or only considered, in S windows.
 
     Means over pairs [windows], divided by their kind's scale if credits are scaled.
     """

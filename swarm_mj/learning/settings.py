@@ -34,7 +34,7 @@ EVEN_SILENCE = math.log(39)  # among 40 equal logits, silence is as likely as sp
 USUAL_SILENCE = 5.5  # training begins with one of 40 robots in seven speaking
 # Where an order of turns lets a robot speak, the others begin all but silent.
 ORDERLY_SILENCE = 7.0
-USUAL_HORIZON = 16  # [windows]
+USUAL_HORIZON = 8  # [windows]
 TRAIN_WINDOWS = (40, 250)  # long missions and short ones should end well alike
 # A generation is thousands of decisions, so an evaluation every 10,000 would follow each of them.
 INDEX_EVALUATED_EVERY = 200_000
@@ -87,7 +87,7 @@ class PpoSettings:
     decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
     least_share: float = setting(0.03, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(
-        32,
+        16,
         "windows of each mission in a rollout",
         label="rollout",
         flag="--rollout-windows",

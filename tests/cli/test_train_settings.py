@@ -91,7 +91,8 @@ def test_every_option_reaches_its_setting_and_no_other(option, value, place):
 @pytest.mark.parametrize(
     ("options", "horizon"),
     [
-        ((), 16),
+        ((), 8),
+        (("--rollout-windows", 100), 8),
         (("--rollout-windows", 12), 6),
         (("--rollout-windows", 1), 1),
         (("--rollout-windows", 12, "--credit-horizon", 12), 12),

@@ -57,6 +57,7 @@ OTHERS = {
     "GNN trained at each size": replace(GNN, label="GNN, each size"),
     "GNN generalized from 40": replace(VARIANT, label="GNN, from 40"),
     BETTER: replace(GNN, label="the paper's GNN"),
+    "one GNN": replace(REWARDED, label="one GNN for all"),
     "GNN with shared reward": REWARDED,
     "GNN with credit per robot": replace(REWARDED, label="GNN, own credit"),
     "GNN trained on AoI": replace(GNN, label="GNN, on AoI"),
