@@ -151,7 +151,7 @@ format: $(DEV)
 	$(BIN)/ruff check --fix .
 
 # The paper's methods with two of ours, and ours with the paper's simplest.
-PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN generalized from 0.25" \
+PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "one GNN" "GNN generalized from 0.25" \
   "GNN trained at each size" "GNN generalized from 40" \
   "GNN trained on AoI" "GNN trained on velocity variance"
 OURS := planner "planner --payload none" sotdma age-gain-csma gnn spatial-tdma tdma gossip csma aloha random-flooding \
@@ -176,7 +176,7 @@ figures: setup
 	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force
 	for name in fig2 fig3 fig4 fig5 fig6; do \
 	  $(BIN)/swarm-mj figures training/results/paper-*.csv \
-	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv 2>/dev/null) \
+	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv training/results/reproduce/$(BUDGET)/one.csv 2>/dev/null) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
 	$(BIN)/swarm-mj figures training/results/paper-*.csv training/results/lookahead.csv \

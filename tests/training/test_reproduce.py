@@ -12,7 +12,7 @@ from experiments import FIGURES, PAPERS
 from synthetic import result
 
 from swarm_mj.cli import parse
-from swarm_mj.evaluation.published import RESULT_FIGURES
+from swarm_mj.evaluation.published import RESULT_FIGURES, points
 from swarm_mj.evaluation.results_files import read_results, write_results
 from swarm_mj.system.packages import commit
 
@@ -246,6 +246,28 @@ def test_full_has_the_authors_budget_and_never_stops_before(figure):
     assert (options.budget, options.patience) == (2_000_000, 0)
     assert options.settings["network.latent"] == 64
     parse(work.flights[0][1])
+
+
+TASKS = {"fig4": "stationary", "fig5": "random-walk", "fig6": "flocking"}
+
+
+def test_the_one_network_is_below_the_published_gnns_at_every_point_of_three_figures():
+    """In age and velocity variance, in each of its three trainings."""
+    flown = rows(program.read_work("one", program.Settings()).tables[0])
+    num_compared = 0
+    for point in points():
+        task = TASKS.get(point.figure.partition("_")[0])
+        if task is None or not point.method.startswith("GNN"):
+            continue
+        ours = [
+            float(row[f"{point.cost}_mean"])
+            for row in flown
+            if row["task"] == task and float(row[point.x_name]) == point.x
+        ]
+        assert len(ours) == 3
+        assert max(ours) < point.mean, point
+        num_compared += len(ours)
+    assert num_compared == 3 * (5 + 2 * 5 + 2 * 2 * 4)
 
 
 @pytest.mark.parametrize("figure", FIGURES)
