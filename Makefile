@@ -176,7 +176,8 @@ figures: setup
 	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force
 	for name in fig2 fig3 fig4 fig5 fig6; do \
 	  $(BIN)/swarm-mj figures training/results/paper-*.csv \
-	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv training/results/reproduce/$(BUDGET)/one.csv 2>/dev/null) \
+	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv 2>/dev/null) \
+	    $$(test $$name = fig3 || ls training/results/reproduce/$(BUDGET)/one.csv 2>/dev/null) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
 	$(BIN)/swarm-mj figures training/results/paper-*.csv training/results/lookahead.csv \

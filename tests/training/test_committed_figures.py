@@ -36,9 +36,10 @@ def results(request):
 
 
 def reproduced(preset, name):
-    """What GNNs cost that were trained anew for a figure, and the one for all."""
+    """What GNNs cost that were trained anew for a figure, and the one for Figs. 4 to 6."""
     folder = ROOT / "training" / "results" / "reproduce" / "quick"
-    paths = [path for path in (folder / f"{name}.csv", folder / "one.csv") if path.exists()]
+    names = (name,) if name == "fig3" else (name, "one")
+    paths = [folder / f"{each}.csv" for each in names if (folder / f"{each}.csv").exists()]
     return [result for path in paths for result in read_results(path)] if preset == "paper" else []
 
 
