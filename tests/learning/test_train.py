@@ -315,7 +315,7 @@ def test_a_minute_of_training_by_the_usual_settings_beats_random_flooding(tmp_pa
     """On missions that neither has seen, mission by mission; tails count, too."""
     mission = paper("stationary", num_robots=20)
     usual = usual_settings("robot", mission, (20,), seed=1)
-    run(replace(usual, held_out=2, evaluate_every=6000), tmp_path, decisions=6000)
+    run(replace(usual, held_out=2, evaluate_every=12_000), tmp_path, decisions=12_000)
     flown = evaluate(
         [str(tmp_path), "random-flooding"], num_robots=20, num_missions=20, seed=4_700_000
     )
