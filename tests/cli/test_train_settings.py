@@ -105,6 +105,18 @@ def test_the_horizon_of_credits_suits_rollouts_and_discount(options, horizon):
     assert asked(*options).ppo.horizon == horizon
 
 
+@pytest.mark.parametrize(
+    ("option", "value", "changes"),
+    [
+        ("--discount", 0.75, {"discount": 0.75, "horizon": 1}),
+        ("--rollout-windows", 6, {"num_steps": 6, "horizon": 3}),
+    ],
+)
+def test_options_that_the_horizon_follows_change_nothing_else(option, value, changes):
+    usual = asked()
+    assert asked(option, value) == replace(usual, ppo=replace(usual.ppo, **changes))
+
+
 def test_missions_in_training_have_one_length_or_one_between_two():
     assert asked("--train-windows", 50).train_windows == (50,)
     assert asked("--train-windows", 50, 200).train_windows == (50, 200)

@@ -215,7 +215,6 @@ def test_news_count_until_they_would_have_come_anyway():
     """By hand: 0 tells 1 of itself at 10.5; then, in the third window, again at 12.5."""
     timestamp = np.full((1, 3, 3), 4.0)
     position_m = np.zeros((1, 3, 2))
-
     speaks, silent = np.array([[1, 1, 2]]), np.array([[0, 1, 2]])
     windows = []
     for n, recipient in enumerate([speaks, silent, speaks, silent]):
