@@ -54,7 +54,6 @@ DEBTS = {
     "training/results/reproduce/quick/fig6.csv",
     "training/results/reproduce/quick/one.csv",
     "training/results/reproduce/quick/tutorial.csv",
-    "training/results/shipped-gnn.csv",
     "training/results/tutorial.csv",
     "training/studies/bit-rates.toml",
     "training/studies/ceiling.toml",
@@ -74,7 +73,6 @@ DEBTS = {
     "training/studies/reference-flocking.toml",
     "training/studies/reference-random-walk.toml",
     "training/studies/reference-stationary.toml",
-    "training/studies/shipped-gnn.toml",
     "training/studies/tutorial.toml",
 }
 

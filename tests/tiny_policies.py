@@ -10,7 +10,7 @@ from swarm_mj.policies.stored import save_gnn
 
 torch.set_num_threads(1)  # tests share the machine's cores
 
-FEATURES = ("paper", "reference", "buffer", "turns", "local", "extended")
+FEATURES = ("paper", "reference", "turns", "local", "extended")
 
 
 def tiny_network(features="extended", seed=1, **shape):

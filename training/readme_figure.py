@@ -26,6 +26,7 @@ from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 POLICIES = ("planner", "sotdma", "age-gain-csma", "gnn", "tdma", "random-flooding")
+SHIPPED = "one GNN"  # the curve that is `gnn`, whose rows among the results are of version 1.0
 PUBLISHED = ("GNN trained at each size", "GNN generalized from 40")
 
 
@@ -44,15 +45,31 @@ class ReadmeFigure:
         metavar="FILE",
         shown="training/results/paper-random-walk.csv",
     )
+    gnn: Path = setting(
+        ROOT / "training" / "results" / "reproduce" / "quick" / "one.csv",
+        "those of gnn",
+        metavar="FILE",
+        shown="training/results/reproduce/quick/one.csv",
+    )
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
         paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
         check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw(read_results(self.results))
+        figure = draw([*others(read_results(self.results)), *shipped(read_results(self.gnn))])
         for path in paths:
             save(figure, path)
         return 0
+
+
+def others(results: Sequence[Result]) -> list[Result]:
+    """Return the results of all policies but `gnn`."""
+    return [result for result in results if result.policy != "gnn"]
+
+
+def shipped(results: Sequence[Result]) -> list[Result]:
+    """Return the results of the network that is shipped, under its name there."""
+    return [replace(result, policy="gnn") for result in results if result.policy == SHIPPED]
 
 
 def draw(results: Sequence[Result]) -> Figure:

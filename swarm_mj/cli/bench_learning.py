@@ -30,7 +30,7 @@ def learning_rows(*, num_robots: int = 40, threads: int = 1, seconds: float = 2.
     mission = paper("stationary", num_robots=num_robots)
     for num_missions in (1, 32):
         yield from _network_rows(mission, num_missions, seconds, clock)
-    for features in ("buffer", "extended"):
+    for features in ("turns", "extended"):
         ratio = _features_windows(features, mission, 32, seconds)
         yield Row(f"{features} features, 32 missions, in windows", ratio, "{:.2f}")
     ratio = _environment_windows(mission, 32, seconds)

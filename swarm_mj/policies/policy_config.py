@@ -7,7 +7,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features
+from swarm_mj.policies.gnn.feature_sets import is_own_set, num_features, uses
 from swarm_mj.policies.index.weights import START
 from swarm_mj.system.fields import check, setting
 from swarm_mj.system.streams import check_printable
@@ -208,10 +208,12 @@ def _network_said(config: GnnConfig | MlpConfig) -> str:
         flags.append(f"--network {config.own_network}")
     if is_own_set(config.features):
         flags.append(f"--features {config.features}")
+    known = "" if is_own_set(config.features) else f" It knows {uses(config.features)}."
     return f"""\
 Every robot evaluates {kind} on the `{config.features}` features of its own
 buffer, and draws from the result which robot it addresses in the next window, or that it stays
-silent. Packets carry T, M and P, as the paper's, and nothing more.
+silent.{known}
+Packets carry T, M and P, as the paper's, and nothing more.
 
     swarm-mj fly --policy FILE --task {" ".join(flags)}
 

@@ -15,7 +15,7 @@ def test_networks_are_timed_alone_and_by_the_batch_and_both_kinds_of_credit_trai
         assert forward.name == f"the paper's network, {missions}: team decisions"
         assert 0.0 < backward.value < forward.value
     named = {row.name: row.value for row in rows}
-    for features in ("buffer", "extended"):
+    for features in ("turns", "extended"):
         assert named[f"{features} features, 32 missions, in windows"] > 0.0
     assert named["a step of make_vec, 32 missions, default features, in windows"] > 0.0
     for name in ("--credit robot", "--credit team"):

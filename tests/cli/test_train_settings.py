@@ -134,14 +134,14 @@ def test_features_bring_the_networks_inputs_along_and_presets_the_papers_way():
 
 def test_robots_begin_more_silent_where_an_order_of_turns_lets_them_speak():
     assert asked("--features", "turns") == asked()
-    for features in ("turns", "buffer", "local", "paper"):
+    for features in ("turns", "local", "paper"):
         assert asked("--features", features).silence_logit == 5.5 < ORDERLY_SILENCE
     assert asked("--features", "extended").silence_logit == ORDERLY_SILENCE
     assert asked("--features", "extended", "--silence-logit", 5).silence_logit == 5.0
     team = usual_settings("team", paper("stationary"), (40,))
     assert asked("--credit", "team", "--features", "paper") == team
-    begun = tiny_config(tiny_network("buffer"), "buffer")
-    assert asked_settings(given("--features", "buffer"), begun).silence_logit == 1.5
+    begun = tiny_config(tiny_network("local"), "local")
+    assert asked_settings(given("--features", "local"), begun).silence_logit == 1.5
 
 
 @pytest.mark.parametrize(

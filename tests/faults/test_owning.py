@@ -202,7 +202,6 @@ def wait_for(address):
         ("swarm_mj", ("bench", "--episodes", 0)),
         ("tools/reference_policy.py", ("weights.npz",)),
         ("training/results.py", ()),
-        ("training/shipped_gnn.py", ()),
     ],
 )
 def test_no_program_takes_0_jobs(forks, tmp_path, program, arguments):

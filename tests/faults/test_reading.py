@@ -1,14 +1,13 @@
 """Files that others hand us, damaged or crafted: one line says so, and the exit code is 2."""
 
 import csv
-import shutil
 import zipfile
 from dataclasses import asdict
 
 import numpy as np
 import pytest
 import synthetic
-from damage import RESULTS, complaint, damaged, program, put_no_file, told_or_read
+from damage import complaint, damaged, program, put_no_file, told_or_read
 from tiny_policies import save_tiny
 
 import swarm_mj
@@ -20,6 +19,12 @@ from swarm_mj.learning.run_folder import read_curve
 from swarm_mj.mission import paper
 from swarm_mj.policies.stored import read_policy
 from swarm_mj.policies.tuning import TABLE, read_table
+
+LEARNING = """decisions,minutes,aoi,aoi_sem,tdma
+0,0.1,55.1,1.4,24.4
+8192,0.6,32.7,1.1,24.4
+16384,1.1,30.1,1.0,24.4
+"""
 
 
 @pytest.mark.slow
@@ -45,10 +50,7 @@ def test_damaged_files_are_told_or_sound(what, tmp_path, tries):
         "results": (lambda: write_results(path, synthetic.everything()), read_results),
         "table": (lambda: path.write_text("".join(TABLE.open().readlines()[:5])), read_table),
         "policy": (lambda: save_tiny(path), read_policy),
-        "curve": (
-            lambda: shutil.copy(RESULTS / "learning" / "rest-curve.csv", path),
-            read_curve,
-        ),
+        "curve": (lambda: path.write_text(LEARNING), read_curve),
     }[what]
     write()
     for _ in damaged(path, tries):
@@ -151,6 +153,6 @@ def test_options_that_name_nothing_are_refused(command, here, capsys):
 @pytest.mark.fault("crafted files are refused")
 def test_experiments_find_their_files_from_anywhere(here):
     """Fault 18."""
-    figure = program("training", "learning_figure").LearningFigure
+    figure = program("training", "readme_figure").ReadmeFigure
     assert script(figure, figure.__call__, ["--out", "figure"]) == 0
     assert (here / "figure.svg").exists()

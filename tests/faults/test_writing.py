@@ -249,9 +249,8 @@ LOOPED = {  # programs and commands with an output that is a link to itself
     "scene": ["swarm_mj", "scene", "--out", "loop.xml", "--force"],
     "train": ["swarm_mj", "train", "--out", "loop", "--budget", "1"],
     "tune": [ROOT / "tools" / "tune.py", "--episodes", "2", "--windows", "3", "--out", "loop.csv"],
-    "learning figure": [ROOT / "training" / "learning_figure.py", "--out", "loop"],
+    "readme figure": [ROOT / "training" / "readme_figure.py", "--out", "loop"],
     "results": [ROOT / "training" / "results.py", "--results", "loop"],
-    "shipped gnn": [ROOT / "training" / "shipped_gnn.py", "--results", "loop"],
 }
 
 

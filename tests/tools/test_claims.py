@@ -62,14 +62,14 @@ def test_margins_are_of_each_range_ratio_and_beside_the_published_ones(folder):
     gnns = [
         result(policy, range_ratio=ratio, aoi_mean=30.0, aoi_sem=3.0)
         for ratio in ratios
-        for policy in ("GNN", "GNN, seed 2", "GNN generalized from 0.25")
+        for policy in ("one GNN", "one GNN, seed 2", "one GNN, another")
     ]
     baselines = [
         result(policy, range_ratio=ratio, aoi_mean=age, aoi_sem=4.0)
         for ratio in ratios
         for policy, age in (("mst", 40.0), ("round-robin", 60.0), ("tdma", 10.0))
     ]
-    write_results(folder / "reproduce" / "quick" / "fig4.csv", gnns)
+    write_results(folder / "reproduce" / "quick" / "one.csv", gnns)
     write_results(folder / "paper-stationary.csv", baselines)
     windows, share, published, published_share = cells(claims.margins(folder))
     assert windows == ["ours [windows]", *["10.0 ± 5.0"] * 5]

@@ -1,10 +1,10 @@
 """The paper's GNN with a memory: each robot also decides by its last windows.
 
-    swarm-mj train --network training.examples.recurrent_gnn:RecurrentGnn --features buffer --out runs/recurrent
+    swarm-mj train --network training.examples.recurrent_gnn:RecurrentGnn --out runs/recurrent
 
 Kurniawan et al. (arXiv 2404.03227) call recurrence crucial to learn to communicate. It is more than
 the paper's information, whose robots decide by their buffers of this moment alone.
-"""  # noqa: E501 - one command, to be copied
+"""
 
 from dataclasses import replace
 

@@ -4,7 +4,6 @@ from collections.abc import Collection, Sequence
 from itertools import zip_longest
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.gnn.buffer_features import BufferFeatures
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, PaperFeatures, ReferenceFeatures
@@ -15,7 +14,6 @@ from swarm_mj.system.user_code import FORM, load
 FEATURE_SETS: dict[str, type[FeatureExtractor]] = {
     "paper": PaperFeatures,
     "reference": ReferenceFeatures,
-    "buffer": BufferFeatures,
     "turns": TurnFeatures,
     "local": LocalFeatures,
     "extended": ExtendedFeatures,
@@ -58,6 +56,11 @@ def num_features(features: str) -> int:
         ValueError: The name is unknown, or a user's own that was not loaded.
     """
     return len(_feature_set(features).names)
+
+
+def uses(features: str) -> str:
+    """Return what a set is made of, in a few words; raises as `make_extractor`."""
+    return _feature_set(features).uses
 
 
 def remembers_packets(features: str) -> bool:
@@ -105,6 +108,11 @@ def check_unchanged(features: str, trained_on: Sequence[str], what: str) -> None
 
 def _feature_set(features: str) -> type[FeatureExtractor]:
     check_named(features, _own, "it")
+    if features == "buffer":
+        raise ValueError(
+            "the features buffer are of versions before 1.1, and turns have taken their place: fly "
+            "a policy that sees by them with the version that made it, or train another"
+        )
     if features not in FEATURE_SETS | _own:
         raise ValueError(
             f"features must be one of {', '.join(FEATURE_SETS)}, or module:Name of your own, not "

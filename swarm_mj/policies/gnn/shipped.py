@@ -5,23 +5,14 @@ weights are those of the file in `assets/policies/`.
 """
 
 from swarm_mj.policies.about import FEW_BYTES, FromPaper, Information, Listed, Look
-from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
+from swarm_mj.policies.gnn.turn_features import TurnFeatures
 
 SHIPPED_GNN = Listed(
     name="gnn",
     origin=FromPaper(section="III"),
     rank=150,
-    uses=f"{ExtendedFeatures.uses}, by a trained graph neural network",
-    beyond=(
-        Information.COMMON_ORDER,
-        Information.CLOCK,
-        Information.TEAM_SIZE,
-        Information.OBSERVED_POSITIONS,
-        Information.RADIO_CONSTANTS,
-        # A feature, the news to a neighbour, counts what that neighbour's T lacks.
-        Information.ACKNOWLEDGEMENTS,
-        Information.DECODED_PACKETS,
-    ),
+    uses=f"{TurnFeatures.uses}, by a trained graph neural network",
+    beyond=(Information.OBSERVED_POSITIONS, Information.RADIO_CONSTANTS),
     payload=None,
     look=Look(label="gnn", colour="#d55e00", marker="*", marker_size=8.0),
     memory=FEW_BYTES,  # beside what `simulation.memory` counts for every learned policy

@@ -10,7 +10,6 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from swarm_mj.policies.gnn.buffer_features import OwnBuffer
 from swarm_mj.policies.gnn.features import Feature, dtype_of, names_of
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import log_age
@@ -92,6 +91,18 @@ Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE`
 OwnNodes = Shaped[np.ndarray, "N"]  # those of one robot's graph
 
 
+class OwnBuffer(NamedTuple):
+    """One robot's buffer; k is a teammate, or the robot itself."""
+
+    timestamp: Float[np.ndarray, "N"]  # T^k [windows]
+    last_attempt: Float[np.ndarray, "N"]  # L^k [windows]
+    position_m: Float[np.ndarray, "N 2"]  # M^k
+    velocity_mps: Float[np.ndarray, "N 2"]  # M^k
+    parent: Int[np.ndarray, "N"]  # P^k
+    is_granted: bool  # whether it knew all states at t = 0
+    spoke: float  # when it last addressed anyone [windows]
+
+
 class Known(NamedTuple):
     """The robots that one robot knows, itself included, the stalest first; room for all N.
 
@@ -120,6 +131,7 @@ class TurnFeatures(FeatureExtractor):
     """The paper's information, with whose turn it is by staleness: the fields of `TurnNode`."""
 
     names: ClassVar[tuple[str, ...]] = names_of(TurnNode)
+    uses: ClassVar[str] = "its buffer and the radio's range"
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return the buffers, encoded; teammates believed far out of range are not addressed."""

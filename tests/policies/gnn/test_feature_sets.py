@@ -8,7 +8,6 @@ from declared import where_text
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.gnn import feature_sets
-from swarm_mj.policies.gnn.buffer_features import BufferFeatures
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatures
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
@@ -27,7 +26,6 @@ from swarm_mj.policies.gnn.turn_features import TurnFeatures
     [
         ("paper", PaperFeatures, 1 + 1 + 1 + 2 + 2 + 1),  # two flags, T, p, v, L (III-A)
         ("reference", ReferenceFeatures, 7),
-        ("buffer", BufferFeatures, 21),
         ("turns", TurnFeatures, 50),
         ("local", LocalFeatures, 18 - 5),  # without the turns agreed beforehand
         ("extended", ExtendedFeatures, 18),
@@ -40,9 +38,11 @@ def test_a_set_is_found_by_its_name_and_has_so_many_features(features, kind, cou
 
 @pytest.mark.parametrize("refuse", [lambda name: make_extractor(name, paper()), num_features])
 def test_unknown_features_are_a_clear_error(refuse):
-    assert set(FEATURE_SETS) == {"paper", "reference", "buffer", "turns", "local", "extended"}
+    assert set(FEATURE_SETS) == {"paper", "reference", "turns", "local", "extended"}
     with pytest.raises(ValueError, match="extended, or module:Name of your own, not 'all'"):
         refuse("all")
+    with pytest.raises(ValueError, match="and turns have taken their place"):
+        refuse("buffer")
 
 
 @pytest.mark.parametrize("features", FEATURES_OF_1_0)

@@ -119,7 +119,7 @@ def test_one_policy_flies_teams_of_any_size(tmp_path, preset):
 @pytest.mark.parametrize("most_speech", [0.1, 0.4])
 def test_an_untrained_robot_speaks_no_more_often_than_it_may(most_speech):
     """Without a bound all would speak in every window, and nobody would hear anything."""
-    policy = learned("buffer", silence_logit=-10.0, most_speech=most_speech)
+    policy = learned("turns", silence_logit=-10.0, most_speech=most_speech)
     recipient = decisions(policy, range(10))
     speaks = recipient != np.arange(MISSION.num_robots)
     error = np.sqrt(most_speech * (1.0 - most_speech) / speaks.size)
@@ -128,8 +128,8 @@ def test_an_untrained_robot_speaks_no_more_often_than_it_may(most_speech):
 
 def test_a_bound_that_no_robot_meets_changes_no_flight():
     """Sharp, but all but silent robots."""
-    free = learned("buffer", silence_logit=3.0, sharpness=1.0)
-    bounded = learned("buffer", silence_logit=3.0, sharpness=1.0, most_speech=0.9)
+    free = learned("turns", silence_logit=3.0, sharpness=1.0)
+    bounded = learned("turns", silence_logit=3.0, sharpness=1.0, most_speech=0.9)
     np.testing.assert_array_equal(decisions(bounded, [1, 2]), decisions(free, [1, 2]))
 
 
