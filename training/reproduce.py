@@ -29,7 +29,8 @@ from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results, write_results
 from swarm_mj.learning.run_folder import CURVE, SETTINGS, read_run
 from swarm_mj.policies.policy_config import SUFFIX
-from swarm_mj.policies.stored import POLICY, read_policy
+from swarm_mj.policies.registry import POLICIES
+from swarm_mj.policies.stored import POLICY, read_weights
 from swarm_mj.system import writing
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.packages import code_digest, commit
@@ -127,14 +128,19 @@ class Work:
         return typed(self.scale.train, own)
 
     def _evaluate(self, missions: str, flown: Iterable[str], draft: Path) -> list[str]:
-        for name in flown:
-            if name not in self.experiment.trainings:
-                known = ", ".join(self.experiment.trainings)
-                raise ValueError(f"{self.figure} flies {name!r}, but trains only {known}")
-        policies = [str(self.policy(name)) for name in flown]
+        policies = [self._flown(name) for name in flown]
         options = typed(shlex.join(typed(self.scale.fly, missions)), self.settings.fly)
         jobs = ["--jobs", f"{self.settings.jobs}"]
         return ["evaluate", "--policy", *policies, *options, *jobs, "--csv", str(draft), "--resume"]
+
+    def _flown(self, name: str) -> str:
+        """Return what `swarm-mj` calls the policy of a training, or a rule that flies beside it."""
+        if name in self.experiment.trainings:
+            return str(self.policy(name))
+        if name in POLICIES:
+            return name
+        known = ", ".join(self.experiment.trainings)
+        raise ValueError(f"{self.figure} flies {name!r}, but trains only {known}")
 
     def check(self) -> None:
         """Pass if all commands can be read, and all tables written.
@@ -203,7 +209,7 @@ class Work:
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
         """Return a row of the table of trainings."""
-        _, config = read_policy(self.folder / name / POLICY)
+        _, config = read_weights(self.folder / name / POLICY)
         return {
             "training": name,
             "options": shlex.join(self._options(name)),
@@ -220,11 +226,12 @@ class Work:
         trained = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
         decisions = {row["training"]: int(row["decisions"]) for _, row in trained}
         for draft, _, curves in self.flights:
-            paths = {str(self.policy(name)): name for name in curves}
+            paths = {self._flown(name): name for name in curves}
             for result in read_results(draft):
                 name = paths[result.policy]
-                # The folder is this machine's.
-                own = {"policy": name, "decisions": decisions[name]}
+                own: dict[str, object] = {"policy": name}  # the folder is this machine's
+                if name in decisions:
+                    own["decisions"] = decisions[name]
                 config = json.dumps(read_json(result.config, dict) | own)
                 for curve in curves[name]:
                     baseline = paths[result.baseline]

@@ -25,7 +25,7 @@ wide = "--receptive-field 1"
 
 [flights]
 "--robots 5" = {narrow = ["GNN", "linear GNN"], wide = ["GNN"]}
-"--robots 6" = {wide = ["GNN generalized from 5"]}
+"--robots 6" = {wide = ["GNN generalized from 5"], tdma = ["a rule"]}
 
 [quick]
 train = "--robots 5 --windows 5 --missions 2 --held-out 1 --latent 4 --depth 1 --budget 64"
@@ -115,11 +115,13 @@ def test_a_tiny_experiment_from_nothing_to_its_tables(made):
         ("linear GNN", 5, "narrow"),
         ("GNN", 5, "narrow"),
         ("GNN generalized from 5", 6, "wide"),
+        ("a rule", 6, "wide"),
     ]
-    configs = [json.loads(result.config) for result in flown]
+    *configs, rule = [json.loads(result.config) for result in flown]
     assert [each["policy"] for each in configs] == ["narrow", "narrow", "wide", "wide"]
     assert [each["receptive_field"] for each in configs] == [0, 0, 1, 1]
     assert {(each["decisions"], each["num_windows"]) for each in configs} == {(64, 5)}
+    assert (rule["policy"], "decisions" in rule) == ("tdma", False)
 
     trained = rows(tiny.kept / "trainings.csv")
     assert [row["training"] for row in trained] == ["narrow", "wide"]
