@@ -5,10 +5,8 @@ import json
 from typing import cast
 
 import pytest
-from safetensors import safe_open
 
 from swarm_mj.policies.gnn.features_of_1_0 import FEATURES_OF_1_0
-from swarm_mj.system.packages import asset
 
 
 def test_the_record_is_as_it_was():
@@ -23,15 +21,6 @@ def test_the_record_cannot_be_changed_while_a_program_runs():
     with pytest.raises(TypeError):
         record["extended"] = ()
     assert all(type(names) is tuple for names in FEATURES_OF_1_0.values())
-
-
-def test_the_shipped_policy_which_is_of_then_stores_the_names_on_record():
-    """It was trained before files named their features; the first layer has a column for each."""
-    with safe_open(asset("policies/gnn.safetensors"), "numpy") as file:
-        said = json.loads(file.metadata()["swarm_mj policy"])
-        first_layer = file.get_tensor("encoder.node.0.weight")
-    assert tuple(said["feature_names"]) == FEATURES_OF_1_0["extended"]
-    assert first_layer.shape[1] == len(FEATURES_OF_1_0["extended"])
 
 
 def test_local_features_were_the_extended_ones_but_for_turns():
