@@ -152,7 +152,8 @@ def _name(row: dict[str, Any], used: Rows) -> str:
     its = [each for each in used if each["policy"] == row["policy"]]
     more = any(each.get("payload") not in (None, "none") for each in its)
     policy = str(row["policy"])
-    name = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else NAMES.get(policy, policy)
+    own = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else policy
+    name = NAMES.get(policy, own)
     return f"{name} ({LARGER_PACKETS})" if more else name
 
 

@@ -218,7 +218,7 @@ class Work:
             "best_decisions": config.training["decisions"],  # of the policy that was kept
             "commit": self._begun()["commit"],
             "experiment": self.digest,
-            "settings": json.dumps(asdict(read_run(self.folder / name).training)),
+            "settings": json.dumps(asdict(read_run(self.folder / name, named=None).training)),
         }
 
     def _results(self) -> Iterator[Result]:
