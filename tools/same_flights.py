@@ -452,8 +452,8 @@ TRAININGS: dict[str, str] = {
         f"{SHORT} --task flocking --robots 6 --latent 8 --silence-logit 1"
         " --budget 512 --evaluate-every 128"
     ),
-    "training-robot-buffer": (
-        f"{SHORT} --task stationary --robots 5 7 --features buffer --latent 8 --silence-logit 1"
+    "training-robot-turns": (
+        f"{SHORT} --task stationary --robots 5 7 --features turns --latent 8 --silence-logit 1"
         " --discount 0.5 --budget 512 --evaluate-every 128"
     ),
     "training-robot-local": (

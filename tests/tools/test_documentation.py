@@ -103,14 +103,14 @@ def test_every_equation_leads_to_its_code(built):
 
 
 def test_links_between_files_become_links_of_the_site():
-    text = """[a](docs/policies.md#list) ![b](assets/figures/learning.png) [c](https://x.org)
+    text = """[a](docs/policies.md#list) ![b](assets/figures/readme.png) [c](https://x.org)
 ```
 [f](no/link)
 ```
 """
     linked, targets = site_links(text, "README.md", "index.md")
     assert linked == text.replace("docs/", "").replace("(assets", "(repository/assets")
-    assert targets == {"assets/figures/learning.png"}
+    assert targets == {"assets/figures/readme.png"}
     linked, targets = site_links("[a](../README.md) [b](code.md)", "docs/x.md", "x.md")
     assert (linked, targets) == ("[a](overview.md) [b](code.md)", set())
 
