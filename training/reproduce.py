@@ -1,4 +1,4 @@
-"""The paper's learned policies, trained and flown again, figure by figure (V).
+"""The paper's learned policies and the recipes of docs/training.md, trained and flown again (V).
 
     python training/reproduce.py --force    # make reproduce: trains all anew, then flies them
     python training/reproduce.py            # flies those that were trained: a part of make results
@@ -115,7 +115,7 @@ class Work:
 
     @cached_property
     def flights(self) -> list[tuple[Path, list[str], dict[str, list[str]]]]:
-        """Each draft, the arguments of `swarm-mj` that make it, and each training's curves."""
+        """Each draft, the arguments of `swarm-mj` that make it, and the curves of each policy."""
         return [
             (draft, self._evaluate(missions, curves, draft), curves)
             for number, (missions, curves) in enumerate(self.experiment.flights.items())

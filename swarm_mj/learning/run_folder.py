@@ -203,8 +203,9 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
     rollout = rollout_bytes(training)
     decisions = limits.decisions or MAX_DECISIONS
     num_flown = num_missions(training, decisions, 1 + OTHER_FLIGHTS)  # at most, to choose
-    held_out = learned_memory(size, num_flown)
-    under_way = learned_memory(size, training.missions)
+    remembers = remembers_packets(training.features)
+    held_out = learned_memory(size, num_flown, remembers_packets=remembers)
+    under_way = learned_memory(size, training.missions, remembers_packets=remembers)
     # What leaves out silent rows sorts a copy of the others before it passes over them.
     passes = max(2.0 * rollout, rollout + passes_bytes(training))
     memory = held_out + (under_way - LIBRARIES - TORCH) + passes

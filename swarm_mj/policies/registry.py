@@ -17,7 +17,9 @@ from typing import TypeGuard
 
 from swarm_mj.mission import Mission
 from swarm_mj.policies.about import About, Listed, VariantOf
+from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
+from swarm_mj.policies.gnn.turn_features import TurnFeatures
 from swarm_mj.policies.index.policy import IndexCsma
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
@@ -273,6 +275,22 @@ def takes_memory_as(name: str) -> str:
         if isinstance(config, IndexConfig):
             return IndexCsma.NAME
     return name
+
+
+def remembers_packets(name: str) -> bool:
+    """Return whether a learned policy keeps N² numbers of packets for each robot.
+
+    One that cannot be read, or sees by a user's own features that are not loaded, may.
+    """
+    if name == SHIPPED:
+        return TurnFeatures.remembers_packets
+    with suppress(ValueError, OSError, ModuleNotFoundError):
+        from swarm_mj.policies.stored import read_weights
+
+        _, config = read_weights(Path(name))
+        assert not isinstance(config, IndexConfig)
+        return feature_sets.remembers_packets(config.features)
+    return True
 
 
 def is_own_policy(name: str) -> bool:

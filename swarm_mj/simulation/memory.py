@@ -5,7 +5,13 @@ peaks: those of flights of large teams should be right within 20 %, others withi
 """
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.registry import about_of, is_learned, is_own_policy, takes_memory_as
+from swarm_mj.policies.registry import (
+    about_of,
+    is_learned,
+    is_own_policy,
+    remembers_packets,
+    takes_memory_as,
+)
 from swarm_mj.system.needs import GB
 from swarm_mj.system.user_code import load
 
@@ -16,7 +22,7 @@ ROBOT = 8.5e3  # in MuJoCo's model, however many missions there are [bytes]
 # Of a mission and each pair of its robots [bytes].
 PAIR = 57.0  # the tables of robots, costs and the radio
 LEARNED_PAIR = 450.0  # these, and the network's input
-HEARD_ENTRY = 4.0  # an entry of a packet that a learned policy remembers, N of each pair
+HEARD_ENTRY = 4.0  # an entry of a packet that some learned policies remember, N of each pair
 # Where these entries are most of it, a message says so: nobody expects a table of N^3.
 REMEMBERING = 120
 
@@ -39,22 +45,27 @@ def policy_memory(policy: str, mission: Mission, num_missions: int = 1) -> float
         load("policy", policy)
     policy = takes_memory_as(policy)
     if is_learned(policy):
-        return learned_memory(mission.num_robots, num_missions)
+        return learned_memory(
+            mission.num_robots, num_missions, remembers_packets=remembers_packets(policy)
+        )
     about = about_of(policy)
     own_pair = 0.0 if about is None else about.memory.of(mission)
     pairs = num_missions * mission.num_robots**2
     return LIBRARIES + ROBOT * mission.num_robots + (PAIR + own_pair) * pairs
 
 
-def learned_memory(num_robots: int, num_missions: int) -> float:
+def learned_memory(num_robots: int, num_missions: int, *, remembers_packets: bool) -> float:
     """Return the memory of missions of N robots that a network flies, with its input [bytes]."""
     pairs = num_missions * num_robots**2
-    return LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * num_robots) * pairs
+    remembered = HEARD_ENTRY * num_robots if remembers_packets else 0.0
+    return LIBRARIES + TORCH + (LEARNED_PAIR + remembered) * pairs
 
 
 def memory_growth(policy: str, mission: Mission) -> str:
     """Return what to say of a policy's memory where it grows with the cube of the team, or ""."""
     num = mission.num_robots
-    if not is_learned(takes_memory_as(policy)) or num < REMEMBERING:
+    if num < REMEMBERING or not is_learned(takes_memory_as(policy)):
+        return ""
+    if not remembers_packets(policy):
         return ""
     return f"{policy} remembers {num:,} numbers for each of {num:,} x {num:,} pairs of robots"

@@ -102,7 +102,7 @@ def small_machine(monkeypatch):
         ),
         (("fly", "--robots", "100", "--windows", "100000"), "GB of memory, and 4 GB are free"),
         (("fly", "--windows", "100000", "--robots", "10"), "0.192 GB on disk, and 0.1 GB fit at"),
-        (("fly", "--policy", "gnn", "--robots", "1000", "--no-record"), "are free"),
+        (("fly", "--policy", "gnn", "--robots", "3000", "--no-record"), "are free"),
         (("fly", "--robots", "3000", "--windows", "4000", "--no-record"), "111 GB of memory, and"),
         (("evaluate", "--jobs", "256", "--robots", "1000"), "choose fewer --jobs, --robots,"),
         (("evaluate", "--episodes", "100000", "--windows", "100000", "--policy", "tdma"), "free"),

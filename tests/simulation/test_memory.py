@@ -1,6 +1,7 @@
 """Memory that is asked for before the work; faults/test_fit.py compares it with measured peaks."""
 
 import pytest
+from tiny_policies import save_tiny
 
 from swarm_mj.mission import paper
 from swarm_mj.policies.index.weights import START, as_tensors
@@ -38,9 +39,14 @@ def test_tables_grow_with_pairs_and_missions_and_by_what_the_policy_says(policy,
     assert policy_memory(policy, MISSION, 3) == pytest.approx(expected)
 
 
-def test_a_network_takes_its_input_and_the_packets_that_it_remembers():
+def test_a_network_takes_its_input_and_the_packets_that_it_remembers(tmp_path):
+    path = str(tmp_path / "mine.safetensors")
+    save_tiny(tmp_path / "mine", "extended")
     expected = LIBRARIES + TORCH + (LEARNED_PAIR + HEARD_ENTRY * 10) * 3 * 10**2
-    assert policy_memory("gnn", MISSION, 3) == learned_memory(10, 3) == pytest.approx(expected)
+    found = policy_memory(path, MISSION, 3)
+    assert found == learned_memory(10, 3, remembers_packets=True) == pytest.approx(expected)
+    expected = LIBRARIES + TORCH + LEARNED_PAIR * 3 * 10**2
+    assert policy_memory("gnn", MISSION, 3) == pytest.approx(expected)
 
 
 def test_a_stored_index_takes_the_memory_of_its_policy_and_no_networks(tmp_path):
@@ -48,16 +54,19 @@ def test_a_stored_index_takes_the_memory_of_its_policy_and_no_networks(tmp_path)
     path = str(save_weights(tmp_path / "mine", as_tensors(START), config))
     large = paper("stationary", num_robots=1000)
     assert policy_memory(path, large) == policy_memory("index-csma", large)
-    assert policy_memory(path, large) < 0.1 * learned_memory(1000, 1)
+    assert policy_memory(path, large) < 0.1 * learned_memory(1000, 1, remembers_packets=True)
     assert memory_growth(path, large) == ""
 
 
-def test_that_memory_grows_with_the_cube_of_the_team_is_said_where_it_is_most_of_it():
+def test_that_memory_grows_with_the_cube_of_the_team_is_said_where_it_is_most_of_it(tmp_path):
     """Of 200 robots 4 N bytes a pair are 800, of 450 for all else; of 40 they are 160."""
     large = paper("stationary", num_robots=1000)
-    says = "gnn remembers 1,000 numbers for each of 1,000 x 1,000 pairs of robots"
-    assert memory_growth("gnn", large) == says
-    assert memory_growth("gnn", MISSION) == ""
+    path = str(tmp_path / "mine.safetensors")
+    save_tiny(tmp_path / "mine", "extended")
+    says = f"{path} remembers 1,000 numbers for each of 1,000 x 1,000 pairs of robots"
+    assert memory_growth(path, large) == says
+    assert memory_growth(path, MISSION) == ""
+    assert memory_growth("gnn", large) == ""
     assert memory_growth("planner", large) == ""
 
 

@@ -110,8 +110,8 @@ def _feature_set(features: str) -> type[FeatureExtractor]:
     check_named(features, _own, "it")
     if features == "buffer":
         raise ValueError(
-            "the features buffer are of versions before 1.1, and turns have taken their place: fly "
-            "a policy that sees by them with the version that made it, or train another"
+            "the features buffer were removed after version 1.0, and turns take their place: fly "
+            "the policy with the version that made it, or train another"
         )
     if features not in FEATURE_SETS | _own:
         raise ValueError(

@@ -41,7 +41,7 @@ def test_unknown_features_are_a_clear_error(refuse):
     assert set(FEATURE_SETS) == {"paper", "reference", "turns", "local", "extended"}
     with pytest.raises(ValueError, match="extended, or module:Name of your own, not 'all'"):
         refuse("all")
-    with pytest.raises(ValueError, match="and turns have taken their place"):
+    with pytest.raises(ValueError, match="and turns take their place"):
         refuse("buffer")
 
 

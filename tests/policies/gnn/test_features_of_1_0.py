@@ -1,4 +1,4 @@
-"""The record of the features of version 1.0.0: it is as it was, and what files of then need."""
+"""The record of the features of version 1.0.0 is as it was, but for sets that are gone."""
 
 import hashlib
 import json
