@@ -2,6 +2,8 @@
 
 import csv
 import json
+import re
+import shlex
 import shutil
 from dataclasses import replace
 from pathlib import Path
@@ -277,3 +279,26 @@ def test_committed_policies_are_of_the_experiment_as_it_stands(figure):
     work = program.read_work(figure, program.Settings())
     assert work.is_trained, "make reproduce trains them anew"
     assert len({row["commit"] for row in rows(work.tables[1])}) == 1
+
+
+def options_of(words):
+    """The values of each option but --out, by its flag."""
+    found = {}
+    for word in words:
+        if word.startswith("--"):
+            found[word] = []
+        else:
+            found[list(found)[-1]].append(word)
+    del found["--out"]
+    return found
+
+
+def test_the_page_has_the_commands_of_the_recipes():
+    text = (ROOT / "docs" / "training.md").read_text(encoding="utf-8")
+    section = text.partition("## Six recipes\n")[2].partition("\n## ")[0]
+    commands = re.findall(r"^swarm-mj train (.*) --out runs/(\w+)$", section, re.MULTILINE)
+    trainings = program.read_work("recipes", program.Settings()).trainings
+    assert {name for _, name in commands} == set(trainings)
+    for options, name in commands:
+        its = options_of([*shlex.split(options), "--out"])
+        assert its == options_of(trainings[name][1:]), name
