@@ -60,8 +60,8 @@ def test_a_long_flight_of_many_takes_what_nobody_has():
     assert needs.file == pytest.approx(1e5 * 110.8e3, rel=0.01)
     bare, learned = (flight.flight_needs(long, p, is_recorded=False) for p in ("tdma", "gnn"))
     assert (bare.memory < 0.3e9, bare.file) == (True, 0.0)
-    # torch, and the packets that a learned policy's robots remember
-    assert learned.memory - bare.memory > 4 * 1000**3
+    # torch, and the network's input
+    assert learned.memory - bare.memory > 0.4e9 + 300 * 1000**2
 
 
 class Clock:
