@@ -5,9 +5,9 @@
 
 What is trained and flown, and with which options, stands in `training/reproduce/`, one file a
 figure; the policies that were trained stand beside it, by scale and figure. `quick` has one to
-ten hundredths of the authors' budget, `full` all of it. Policies that are there are not trained
-again, and flights of this commit not flown again, unless `--force` says so. An interrupted run goes
-on where it broke off, as long as the commit is the same.
+ten hundredths of the authors' budget, `full` all of it; recipes have their own. Policies that are
+there are not trained again, and flights of this commit not flown again, unless `--force` says so.
+An interrupted run goes on where it broke off, as long as the commit is the same.
 """
 
 import hashlib

@@ -30,7 +30,13 @@ from swarm_mj.policies.policy import (
     check_parameters,
 )
 from swarm_mj.policies.policy_arguments import PolicyArguments
-from swarm_mj.policies.policy_config import SUFFIX, IndexConfig
+from swarm_mj.policies.policy_config import (
+    SUFFIX,
+    GnnConfig,
+    IndexConfig,
+    MlpConfig,
+    StoredConfig,
+)
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.policies.tuning import tuned_probability
 from swarm_mj.system.arguments import check_kind, did_you_mean, unwrapped
@@ -266,15 +272,7 @@ def takes_memory_as(name: str) -> str:
 
     A file that cannot be read is said to be unsound where it is loaded.
     """
-    if not is_stored(name):
-        return name
-    with suppress(ValueError, OSError, ModuleNotFoundError):
-        from swarm_mj.policies.stored import read_weights
-
-        _, config = read_weights(Path(name))
-        if isinstance(config, IndexConfig):
-            return IndexCsma.NAME
-    return name
+    return IndexCsma.NAME if isinstance(_stored_config(name), IndexConfig) else name
 
 
 def remembers_packets(name: str) -> bool:
@@ -284,13 +282,23 @@ def remembers_packets(name: str) -> bool:
     """
     if name == SHIPPED:
         return TurnFeatures.remembers_packets
+    config = _stored_config(name)
+    if isinstance(config, GnnConfig | MlpConfig):
+        with suppress(ValueError):
+            return feature_sets.remembers_packets(config.features)
+    return True
+
+
+def _stored_config(name: str) -> StoredConfig | None:
+    """Return the config of a stored policy; None if it is another one, or cannot be read."""
+    if not is_stored(name):
+        return None
     with suppress(ValueError, OSError, ModuleNotFoundError):
         from swarm_mj.policies.stored import read_weights
 
         _, config = read_weights(Path(name))
-        assert not isinstance(config, IndexConfig)
-        return feature_sets.remembers_packets(config.features)
-    return True
+        return config
+    return None
 
 
 def is_own_policy(name: str) -> bool:

@@ -64,8 +64,7 @@ def learned_memory(num_robots: int, num_missions: int, *, remembers_packets: boo
 def memory_growth(policy: str, mission: Mission) -> str:
     """Return what to say of a policy's memory where it grows with the cube of the team, or ""."""
     num = mission.num_robots
-    if num < REMEMBERING or not is_learned(takes_memory_as(policy)):
-        return ""
-    if not remembers_packets(policy):
+    is_network = is_learned(takes_memory_as(policy))
+    if num < REMEMBERING or not is_network or not remembers_packets(policy):
         return ""
     return f"{policy} remembers {num:,} numbers for each of {num:,} x {num:,} pairs of robots"
