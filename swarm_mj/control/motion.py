@@ -16,6 +16,7 @@ from jaxtyping import Bool, Float
 
 from swarm_mj.mission import FlockingSet, Mission
 from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers
 from swarm_mj.protocol.costs import velocity_variance
@@ -30,7 +31,7 @@ class Controller(Protocol):
     A controller that draws or remembers is also `Started`: it gets the missions' random streams.
     """
 
-    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N D"]:
         """Return the accelerations u [m/s²], which the physics clips to plus or minus A_max.
 
         Buffers are read-only. Row [b, i] may use row [b, i] of them and of the states only.
@@ -75,15 +76,20 @@ def controller_of(mission: Mission) -> Controller:
             assert_never(unknown)  # a type error here is a task without a controller
 
 
-def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N 2"]:
-    """Draw the initial velocities [m/s]: uniform in plus or minus V_max per axis, or 0 (IV-A)."""
+def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N D"]:
+    """Draw the initial velocities [m/s]: uniform in plus or minus V_max per axis, or 0 (IV-A).
+
+    Of bodies they are those in the plane; none climbs.
+    """
     if not mission.moves:
-        return np.zeros((mission.num_robots, 2))
+        return np.zeros((mission.num_robots, mission.num_axes))
     limit = mission.max_velocity_mps
-    return rng.uniform(-limit, limit, size=(mission.num_robots, 2))
+    velocity_mps = np.zeros((mission.num_robots, mission.num_axes))
+    velocity_mps[:, :PLANE] = rng.uniform(-limit, limit, size=(mission.num_robots, PLANE))
+    return velocity_mps
 
 
-def stand(_buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
+def stand(_buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N D"]:
     """Accelerate no robot."""
     return np.zeros_like(states.velocity_mps)
 
@@ -96,11 +102,16 @@ class RandomWalk:
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Give every robot its own stream of numbers; arguments as in `Started.start`."""
-        self._stream = Stream(rngs, normal, (num_robots, 2))
+        self._stream = Stream(rngs, normal, (num_robots, PLANE))
 
-    def __call__(self, _buffers: Buffers, _states: RobotStates) -> Float[np.ndarray, "B N 2"]:
-        """Return the next accelerations [m/s²]."""
-        return self._stream.next() * self._deviation_mps2
+    def __call__(self, _buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N D"]:
+        """Return the next accelerations [m/s²], which climb nowhere."""
+        drawn_mps2 = self._stream.next() * self._deviation_mps2
+        if states.velocity_mps.shape[2] == PLANE:
+            return drawn_mps2
+        acceleration_mps2 = np.zeros_like(states.velocity_mps)
+        acceleration_mps2[..., :PLANE] = drawn_mps2
+        return acceleration_mps2
 
 
 class Flocking:
@@ -112,7 +123,7 @@ class Flocking:
     def __init__(self, mission: Mission) -> None:
         self._flocking_set: FlockingSet = mission.flocking_set
 
-    def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates) -> Float[np.ndarray, "B N D"]:
         """Return the next accelerations [m/s²]."""
         return flocking(buffers, states.velocity_mps, self._flocking_set)
 
@@ -122,8 +133,8 @@ class Flocking:
 
 
 def flocking(
-    buffers: Buffers, velocity_mps: Float[np.ndarray, "B N 2"], flocking_set: FlockingSet
-) -> Float[np.ndarray, "B N 2"]:
+    buffers: Buffers, velocity_mps: Float[np.ndarray, "B N D"], flocking_set: FlockingSet
+) -> Float[np.ndarray, "B N D"]:
     """Return the mean difference of known velocities to the own one, per second [m/s²] (Eq. 16).
 
     The flocking set F is of robots with T > T_0 (`heard`, the paper) or, per axis, with a velocity
@@ -131,13 +142,13 @@ def flocking(
     empty the acceleration is 0.
 
     Args:
-        buffers: What each robot knows of the others' velocities, [B N N 2], [m/s], and of whom it
+        buffers: What each robot knows of the others' velocities, [B N N D], [m/s], and of whom it
             knows anything, [B N N].
-        velocity_mps: The robots' own velocities, [B N 2], [m/s].
+        velocity_mps: The robots' own velocities, [B N D], [m/s].
         flocking_set: "heard" or "moving".
 
     Returns:
-        The accelerations u, [B N 2], [m/s²]; the physics clips them.
+        The accelerations u, [B N D], [m/s²]; the physics clips them.
     """
     is_counted = None if flocking_set == "moving" else buffers.is_known
     return _mean_difference(is_counted, buffers.velocity_mps, velocity_mps)
@@ -146,14 +157,14 @@ def flocking(
 @compiled()
 def _mean_difference(
     is_counted: Bool[np.ndarray, "B N N"] | None,
-    known_mps: Float[np.ndarray, "B N N 2"],
-    velocity_mps: Float[np.ndarray, "B N 2"],
-) -> Float[np.ndarray, "B N 2"]:
+    known_mps: Float[np.ndarray, "B N N D"],
+    velocity_mps: Float[np.ndarray, "B N D"],
+) -> Float[np.ndarray, "B N D"]:
     num_missions, num_robots = known_mps.shape[:2]
     acceleration = np.zeros_like(velocity_mps)
     for b in range(num_missions):
         for i in range(num_robots):
-            for axis in range(2):
+            for axis in range(velocity_mps.shape[2]):
                 total = 0.0
                 num_counted = 0
                 for j in range(num_robots):

@@ -103,7 +103,7 @@ def credits_over(windows: Sequence[ReplayedWindow], horizon: int) -> Credits:
 
 def replay_otherwise(
     timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N 2"],
+    position_m: Float[np.ndarray, "B N D"],
     recipient: Int[np.ndarray, "B N"],
     channel: Channel | VaryingChannel,
     now: Float[np.ndarray, "B"],
@@ -166,7 +166,7 @@ def replay_otherwise(
 class _World(NamedTuple):
     """The places, the channel and the clock in which windows of B missions are replayed."""
 
-    position_m: Float[np.ndarray, "B N 2"]
+    position_m: Float[np.ndarray, "B N D"]
     channel: Channel | VaryingChannel
     now: Float[np.ndarray, "B"]
     is_active: Bool[np.ndarray, "B N"] | None

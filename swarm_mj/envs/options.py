@@ -28,8 +28,8 @@ from swarm_mj.system.arguments import check_choice
 class RobotTruth(NamedTuple):
     """The numbers of each robot in `truth`, in this order; all is normalised, and has no unit."""
 
-    position: Float[np.ndarray, "B N 2"]  # by half the side of the area
-    velocity: Float[np.ndarray, "B N 2"]  # by the maximum
+    position: Float[np.ndarray, "B N D"]  # by half the side of the area
+    velocity: Float[np.ndarray, "B N D"]  # by the maximum
     is_active: Float[np.ndarray, "B N 1"]  # 1, or 0 once it has failed
     age: Float[np.ndarray, "B N N"]  # of what it knows of each robot: 0 is now; 1: never known
 

@@ -30,7 +30,7 @@ def count_ages(
 @compiled()
 def connectivity_floor(
     timestamp: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N 2"],
+    position_m: Float[np.ndarray, "B N D"],
     range_m: float,
     now: Float[np.ndarray, "B"],
     is_on: Bool[np.ndarray, "B N"],

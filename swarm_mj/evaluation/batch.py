@@ -48,7 +48,7 @@ class Moment:
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     now: Float[np.ndarray, "B"]  # t [windows]
     is_active: Bool[np.ndarray, "B N"]
-    position_m: Float[np.ndarray, "B N 2"]
+    position_m: Float[np.ndarray, "B N D"]
     range_m: float  # of a packet in silence
     is_steady: bool  # whether the window is of the second half
     is_last: bool  # whether it is the mission's last

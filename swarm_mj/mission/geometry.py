@@ -1,4 +1,7 @@
-"""Teams in the plane: who is connected to whom, and the shortest tree that connects everyone."""
+"""Teams in space: who is connected to whom, and the shortest tree that connects everyone.
+
+Positions have D axes: two in the plane, or three.
+"""
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -6,19 +9,25 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.system.compiled import compiled
 
 ROOT = -1  # the parent of the root
+PLANE = 2  # axes of a team whose robots are all at one height
+SPACE = 3  # axes of a team whose robots have a height
 
 
 @compiled()
-def squared_distance(position_m: Float[np.ndarray, "N 2"], i: int, j: int) -> float:
+def squared_distance(position_m: Float[np.ndarray, "N D"], i: int, j: int) -> float:
     """Return the square of the distance of two robots [m²]."""
     dx = position_m[i, 0] - position_m[j, 0]
     dy = position_m[i, 1] - position_m[j, 1]
-    return dx * dx + dy * dy
+    squared_m2 = dx * dx + dy * dy
+    if position_m.shape[1] > PLANE:
+        dz = position_m[i, 2] - position_m[j, 2]
+        squared_m2 += dz * dz
+    return squared_m2
 
 
 @compiled()
 def gather_connected(
-    position_m: Float[np.ndarray, "N 2"],
+    position_m: Float[np.ndarray, "N D"],
     range_m: float,
     first: int,
     is_met: Bool[np.ndarray, "N"],
@@ -46,7 +55,7 @@ def gather_connected(
 
 @compiled()
 def count_strayed(
-    position_m: Float[np.ndarray, "B N 2"],
+    position_m: Float[np.ndarray, "B N D"],
     range_m: float,
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> Float[np.ndarray, "B"]:
@@ -71,7 +80,7 @@ def count_strayed(
 
 
 @compiled()
-def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B N"]:
+def spanning_tree(position_m: Float[np.ndarray, "B N D"]) -> Int[np.ndarray, "B N"]:
     """Return each robot's parent in the Euclidean minimum spanning tree, or `ROOT`."""
     num_missions, num_robots = position_m.shape[:2]
     parent = np.empty((num_missions, num_robots), dtype=np.int64)
@@ -83,7 +92,7 @@ def spanning_tree(position_m: Float[np.ndarray, "B N 2"]) -> Int[np.ndarray, "B 
 
 
 @compiled()
-def _grow(position_m: Float[np.ndarray, "N 2"], is_edge: Bool[np.ndarray, "N N"]) -> None:
+def _grow(position_m: Float[np.ndarray, "N D"], is_edge: Bool[np.ndarray, "N N"]) -> None:
     """Mark the tree's edges: Prim's algorithm from robot 0."""
     num_robots = position_m.shape[0]
     nearest = np.zeros(num_robots, dtype=np.int64)  # in the tree, of each robot outside it

@@ -5,6 +5,7 @@ each part of a mission has its names and types once more, below its dataclass; a
 equal to those of `Mission`.
 """
 
+from swarm_mj.mission.bodies import BodiesFields
 from swarm_mj.mission.conventions import ConventionsFields
 from swarm_mj.mission.dynamics import DynamicsFields
 from swarm_mj.mission.faults import FaultsFields
@@ -22,6 +23,7 @@ class MissionFields(
     SurroundingsFields,
     ImpairmentsFields,
     KnowledgeFields,
+    BodiesFields,
     DynamicsFields,
     ConventionsFields,
     total=False,

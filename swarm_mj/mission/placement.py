@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.mission.geometry import gather_connected
+from swarm_mj.mission.geometry import PLANE, SPACE, gather_connected
 from swarm_mj.mission.specification import Mission
 from swarm_mj.system.compiled import compiled
 
@@ -19,11 +19,11 @@ MAX_FREE_DRAWS = 1000  # for one robot; in an area that is half free it needs tw
 MAX_ROBOTS_DRAWN = 2_000_000  # bounds the draws of large teams, whose test takes longer
 
 # Answers a question about each robot of a team at these positions [m].
-Test = Callable[[Float[np.ndarray, "N 2"]], Bool[np.ndarray, "N"]]
+Test = Callable[[Float[np.ndarray, "N D"]], Bool[np.ndarray, "N"]]
 
 
 @compiled()
-def largest_part(position_m: Float[np.ndarray, "N 2"], range_m: float) -> Bool[np.ndarray, "N"]:
+def largest_part(position_m: Float[np.ndarray, "N D"], range_m: float) -> Bool[np.ndarray, "N"]:
     """Return who is in the largest connected part of the disk graph.
 
     That is everyone if its algebraic connectivity (Fiedler 1973), which the paper tests (IV-B), is
@@ -54,18 +54,22 @@ def connected_positions(
     is_blocked_at: Test | None = None,
     *,
     keeps_largest: bool = False,
-) -> Float[np.ndarray, "N 2"]:
+    height_m: Float[np.ndarray, "N"] | None = None,
+) -> Float[np.ndarray, "N D"]:
     """Return positions uniform in the area at which the team is connected [m] (IV-B).
 
     Positions lie within plus or minus `half_side_m`. By default the disk graph must be connected;
     `largest_part_at` says who is in the largest connected part under the team's own channel. Robots
     that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest`, and where
     the largest part is known, only robots outside it are drawn anew, not the whole team: between
-    obstacles, or of thousands, hardly any team is connected that is drawn at once. Raises
+    obstacles, or of thousands, hardly any team is connected that is drawn at once. Robots with a
+    `height_m` are there [m], and have three axes. Raises
     ValueError if all draws were disconnected, or the area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
-    position_m = np.empty((num_robots, 2))
+    position_m = np.empty((num_robots, PLANE if height_m is None else SPACE))
+    if height_m is not None:
+        position_m[:, PLANE] = height_m
     is_kept = np.zeros(num_robots, dtype=np.bool_)
     find = largest_part_at or partial(largest_part, range_m=range_m)
     for _ in range(num_draws):
@@ -84,7 +88,7 @@ def connected_positions(
 
 
 def _draw_free(
-    position_m: Float[np.ndarray, "N 2"],
+    position_m: Float[np.ndarray, "N D"],
     is_kept: Bool[np.ndarray, "N"],
     half_side_m: float,
     rng: np.random.Generator,
@@ -93,8 +97,8 @@ def _draw_free(
     """Draw where all others stand, and those anew that cannot be there, until all can."""
     is_due = ~is_kept
     for _ in range(MAX_FREE_DRAWS):
-        fresh = rng.uniform(-half_side_m, half_side_m, size=(int(np.sum(is_due)), 2))
-        position_m[is_due] = fresh
+        fresh = rng.uniform(-half_side_m, half_side_m, size=(int(np.sum(is_due)), PLANE))
+        position_m[is_due, :PLANE] = fresh
         if is_blocked_at is None or not np.any(is_due := is_blocked_at(position_m)):
             return
     raise ValueError(

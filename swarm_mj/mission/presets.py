@@ -4,6 +4,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, Unpack
 
+from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.keywords import MissionFields, TaskAndFields
 from swarm_mj.mission.specification import Mission
 from swarm_mj.mission.surroundings import OPEN
@@ -15,7 +16,7 @@ def paper(task: Task = "flocking", **overrides: Unpack[MissionFields]) -> Missio
     """Return the paper's text, taken literally.
 
     Unless overridden, a flock has no boundary. In an arena with obstacles it has one, and physics
-    are `contact`, as where robots collide.
+    are `contact`, as where robots collide or have bodies.
 
     Args:
         task: What the robots do: "stationary", "random-walk" or "flocking".
@@ -178,10 +179,11 @@ def _overridden(preset: Mission, overrides: MissionFields) -> Mission:
     """Return a preset's mission with other fields, and the walls and physics that go with them."""
     is_open = overrides.get("arena", preset.arena) == OPEN
     is_touching = not is_open or overrides.get("collide", preset.collide)
+    has_bodies = overrides.get("robot", preset.robot) != POINT
     usual: MissionFields = {
         # The paper's flocks fly off freely; obstacles only make sense where robots stay.
         "boundary": "none" if preset.flocks and is_open else "reflect",
-        "physics": "contact" if is_touching else "exact",
+        "physics": "contact" if is_touching or has_bodies else "exact",
     }
     return replace(preset, **(usual | overrides))
 

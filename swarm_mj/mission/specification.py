@@ -1,14 +1,15 @@
 """The mission (IV-B): every number of the paper with its unit and source.
 
 Its parts stand in modules of their own, in the order of options and tables: `team`, `transceiver`,
-`faults`, `surroundings`, `impairments`, `knowledge`, `dynamics` and `conventions`. The last has the
-differences between the paper's text and its authors' code: `presets.paper` follows the text,
-`presets.reference` the code.
+`faults`, `surroundings`, `impairments`, `knowledge`, `bodies`, `dynamics` and `conventions`. The
+last has the differences between the paper's text and its authors' code: `presets.paper` follows the
+text, `presets.reference` the code.
 """
 
 from dataclasses import dataclass
 from typing import Any, get_args
 
+from swarm_mj.mission.bodies import Bodies
 from swarm_mj.mission.conventions import Conventions
 from swarm_mj.mission.dynamics import Dynamics
 from swarm_mj.mission.faults import Faults
@@ -24,7 +25,15 @@ from swarm_mj.system.fields import check, former_names
 # A dataclass has its bases' fields from the last base to the first: the team's come first.
 @dataclass(frozen=True, kw_only=True)
 class Mission(
-    Conventions, Dynamics, Knowledge, Impairments, Surroundings, Faults, Transceiver, Team
+    Conventions,
+    Dynamics,
+    Bodies,
+    Knowledge,
+    Impairments,
+    Surroundings,
+    Faults,
+    Transceiver,
+    Team,
 ):
     """A mission's numbers; the defaults are the paper's text (IV-B).
 
@@ -63,7 +72,18 @@ class Mission(
                 "exact physics knows no collisions; choose physics contact, or arena open (it is "
                 f"{self.arena}) whose robots pass through each other"
             )
+        self._check_bodies()
         self._check_sensing()
+
+    def _check_bodies(self) -> None:
+        """Raise ValueError for bodies whose numbers are wrong, or that are to move as points."""
+        if not isinstance(self.robot, str):
+            raise ValueError(f"robot must be a name, not {self.robot!r:.80}")
+        _ = self.groups
+        if self.physics == "exact" and self.has_bodies:
+            raise ValueError(
+                f"exact physics is that of points; choose physics contact for robot {self.robot}"
+            )
 
     def _check_sensing(self) -> None:
         """Raise ValueError for what no receiver senses, or minislots that leave no slot."""

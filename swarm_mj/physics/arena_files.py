@@ -1,4 +1,4 @@
-"""Arenas in files: a user's MJCF, which is checked before MuJoCo reads it."""
+"""MJCF files of a user's, checked before MuJoCo reads them, and arenas made of them."""
 
 from collections.abc import Iterator
 from contextlib import suppress
@@ -39,16 +39,20 @@ def add_file(spec: MjSpec, mission: Mission) -> None:
         name, where = next(iter(idle.items()))
         said = f"no obstacle can do anything; {name} stands {where}"
         raise ValueError(f"arena {mission.arena}: {said}")
-    for settings in ("option", "visual", "stat"):
-        _take_over(getattr(spec, settings), getattr(theirs, settings))
-    for size in SIZES:
-        setattr(theirs, size, getattr(spec, size))
+    take_over_settings(spec, theirs)
     spec.nuser_geom = max(spec.nuser_geom, theirs.nuser_geom)  # or their losses would be cut off
     spec.attach(theirs, frame=spec.worldbody.add_frame(), prefix="arena/")
 
 
+def take_over_settings(ours: MjSpec, theirs: MjSpec) -> None:
+    """Put a scene's settings in place of a file's that is attached: MuJoCo warns of each, twice."""
+    for settings in ("option", "visual", "stat"):
+        _take_over(getattr(ours, settings), getattr(theirs, settings))
+    for size in SIZES:
+        setattr(theirs, size, getattr(ours, size))
+
+
 def _take_over(ours: object, theirs: object) -> None:
-    """Put our settings in place of a file's, which do not count: MuJoCo warns of each, twice."""
     for name in dir(ours):
         value = getattr(ours, name)
         if name.startswith("_") or callable(value):
@@ -62,7 +66,15 @@ def _take_over(ours: object, theirs: object) -> None:
 
 
 def read_arena(file: str) -> MjSpec:
-    """Read an MJCF file; raise ValueError in one line that names the file, as MuJoCo does not."""
+    """Read an arena's MJCF file, as `read_mjcf` does."""
+    return read_mjcf("arena", file)
+
+
+def read_mjcf(what: str, file: str) -> MjSpec:
+    """Read an MJCF file, which is an arena or a robot.
+
+    Raises ValueError in one line that names the file, as MuJoCo does not.
+    """
     path = Path(file).absolute()  # MuJoCo finds what included files include by no other
     try:
         elements = list(_elements(path))
@@ -76,7 +88,7 @@ def read_arena(file: str) -> MjSpec:
         _check_copies(path)
         return MjSpec.from_file(str(path))
     except ValueError as error:
-        raise _refused(file, error) from error
+        raise ValueError(f"{what} {file}: {' '.join(str(error).split())}") from error
 
 
 def _elements(path: Path, above: tuple[Path, ...] = ()) -> Iterator[ElementTree.Element]:

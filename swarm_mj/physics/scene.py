@@ -2,16 +2,21 @@
 
 import copy
 import math
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 from xml.etree import ElementTree
 
 import numpy as np
+from jaxtyping import Float
 from mujoco._enums import mjtDisableBit
-from mujoco._specs import MjsGeom, MjSpec
+from mujoco._specs import MjsBody, MjsGeom, MjSpec
+from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.obstacles import OBSTACLE_GROUP
+from swarm_mj.physics.pilots import GRAVITY_MPS2
+from swarm_mj.physics.robots import RobotKind, add_robots, heading_of, kinds_of, pose_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.arguments import name_of
 from swarm_mj.system.packages import asset
@@ -49,7 +54,10 @@ WALL_HALF_HEIGHT_M = 5.0  # assets/arena.xml
 NAMES = {"name", "joint"}  # attributes that hold a robot's own names, assets/robot.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
-ROBOTS_BIT = 2  # of the masks that say who collides; what scenes add has 1
+SCENE_BIT = 1  # of the masks that say who collides: what scenes add
+ROBOTS_BIT = 2  # of these masks: robots, where they collide with each other
+AIR_DENSITY = 1.204  # around bodies, at 20 °C and sea level [kg/m³]
+AIR_VISCOSITY = 1.82e-5  # likewise [Pa s]
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
@@ -123,6 +131,23 @@ def num_substeps(mission: Mission) -> int:
     return math.ceil(mission.window_s / longest_s - 1e-9)
 
 
+def num_body_steps(mission: Mission, kinds: Sequence[RobotKind]) -> int:
+    """MuJoCo steps per window of robots with bodies: no step is longer than any model asks for."""
+    shortest_s = min(kind.step_s for kind in kinds)
+    return math.ceil(mission.window_s / shortest_s - 1e-9)
+
+
+def compiled_scene(spec: MjSpec, scene: Scene | None) -> MjModel:
+    """Return a composed scene as MuJoCo flies it; raise ValueError, in a line, if it cannot."""
+    try:
+        return spec.compile()
+    except ValueError as error:  # MuJoCo's, in several lines
+        if scene is None:
+            raise
+        said = " ".join(str(error).split())
+        raise ValueError(f"the scene does not compile: {said}") from error
+
+
 def compose(
     mission: Mission, start: RobotStates | None = None, *, scene: Scene | None = None
 ) -> MjSpec:
@@ -142,13 +167,16 @@ def compose(
         ValueError: The arena is unknown, or the scene changed how robots move: it added, took away
             or renamed joints or actuators, or changed one of their numbers or the solver's.
     """
-    spec = _arena_with_robots(mission.num_robots)
-    spec.option.timestep = timestep_s(mission)
+    if mission.has_bodies:
+        spec = _arena_with_bodies(mission)
+    else:
+        spec = _arena_with_robots(mission.num_robots)
+        spec.option.timestep = timestep_s(mission)
+        _fit_robots(spec, mission)
+        if mission.collide:
+            spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     spec.modelname = f"swarm of {mission.num_robots}"
     _scale_arena(spec, mission)
-    _fit_robots(spec, mission)
-    if mission.collide:
-        spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     arena = arena_of(mission)
     if arena is not None:
         _change(spec, mission, arena)
@@ -174,6 +202,22 @@ def _arena_with_robots(num_robots: int) -> MjSpec:
     return MjSpec.from_string(ElementTree.tostring(arena, encoding="unicode"))
 
 
+def _arena_with_bodies(mission: Mission) -> MjSpec:
+    """Return the arena with gravity, air and a floor that carries, and the robots' models in it."""
+    spec = MjSpec.from_file(str(asset("arena.xml")))
+    kinds = kinds_of(mission)
+    spec.option.timestep = mission.window_s / num_body_steps(mission, kinds)
+    spec.option.gravity = [0.0, 0.0, -GRAVITY_MPS2]
+    spec.option.density = AIR_DENSITY
+    spec.option.viscosity = AIR_VISCOSITY
+    for bit in (mjtDisableBit.mjDSBL_CONTACT, mjtDisableBit.mjDSBL_GRAVITY):
+        spec.option.disableflags &= ~int(bit)
+    spec.geom("floor").contype = SCENE_BIT
+    meets = SCENE_BIT | (ROBOTS_BIT if mission.collide else 0)
+    add_robots(spec, kinds, contype=ROBOTS_BIT, conaffinity=meets)
+    return spec
+
+
 def _rename(element: ElementTree.Element, i: int) -> None:
     """Make names in an element, and in those within it, names of robot i's own."""
     for each in element.iter():
@@ -185,14 +229,17 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
     """Let a scene change the arena, but neither the robots' joints nor how MuJoCo steps."""
     parts = _moving_parts(spec)
     before = _motion(spec)
-    hulls = _hulls(spec, mission)
+    hulls = {} if mission.has_bodies else _hulls(spec, mission)
+    step_s = spec.option.timestep
     flags = spec.option.disableflags
     scene(spec, mission)
     _check_parts(scene, parts, _moving_parts(spec))
     _check_unchanged("how robots move", before, _motion(spec))
-    _check_unchanged("the robots' hulls", hulls, _hulls(spec, mission))
-    spec.option.timestep = timestep_s(mission)
+    spec.option.timestep = step_s
     spec.option.disableflags = flags
+    if mission.has_bodies:
+        return
+    _check_unchanged("the robots' hulls", hulls, _hulls(spec, mission))
     if mission.physics == "exact":
         spec.option.disableflags |= int(mjtDisableBit.mjDSBL_CONTACT)
         return
@@ -278,6 +325,9 @@ def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
     """
     position_m = start.position_m[0]
     velocity_mps = start.velocity_mps[0]
+    if start.attitude is not None:
+        _place_bodies(spec, mission, position_m, velocity_mps, start.attitude[0])
+        return
     for i, (x, y) in enumerate(position_m.tolist()):
         spec.body(f"r{i}/body").pos = [x, y, ROBOT_HEIGHT_M]
         spec.joint(f"r{i}/x").ref = x
@@ -285,6 +335,44 @@ def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
     key = spec.add_key(name="start", qpos=position_m.ravel(), qvel=velocity_mps.ravel())
     if mission.physics == "exact":  # whose servos take velocities
         key.ctrl = velocity_mps.ravel()
+
+
+def _place_bodies(
+    spec: MjSpec,
+    mission: Mission,
+    position_m: Float[np.ndarray, "N 3"],
+    velocity_mps: Float[np.ndarray, "N 3"],
+    attitude: Float[np.ndarray, "N 4"],
+) -> None:
+    """Put robots with bodies at their start: as the model's own pose, and as a keyframe."""
+    kinds = kinds_of(mission)
+    qvel = []
+    for kind in kinds:
+        for i in range(kind.first, kind.first + kind.num_robots):
+            base = _base_of(spec, i)
+            own_mps = np.zeros(kind.model.nv)
+            if kind.is_free:
+                base.pos = position_m[i]
+                own_mps[:3] = velocity_mps[i]
+            else:
+                x, y = position_m[i, :2].tolist()
+                base.pos = [x, y, kind.base_m]
+                heading = heading_of(attitude[i])
+                for joint, ref in zip(base.joints, (x, y, heading), strict=True):
+                    joint.ref = ref
+                own_mps[:2] = velocity_mps[i, :2]
+            base.quat = attitude[i]
+            qvel.append(own_mps)
+    qpos = pose_of(kinds, position_m, attitude)
+    spec.add_key(name="start", qpos=qpos, qvel=np.concatenate(qvel))
+
+
+def _base_of(spec: MjSpec, i: int) -> MjsBody:
+    """Return the body of robot i that moves in the world."""
+    for body in spec.worldbody.bodies:
+        if body.name.startswith(f"r{i}/"):
+            return body
+    raise ValueError(f"a scene must leave the robots, but took away r{i}")
 
 
 def _scale_arena(spec: MjSpec, mission: Mission) -> None:

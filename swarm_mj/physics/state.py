@@ -13,15 +13,19 @@ KINDS = SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 2, 3, 4, 5, 6  # as MuJoCo n
 
 @dataclass(frozen=True, kw_only=True)
 class RobotStates:
-    """Where the robots truly are and who is active, in all B missions at once."""
+    """Where the robots truly are and who is active, in all B missions at once.
 
-    position_m: Float[np.ndarray, "B N 2"]  # p [m]
-    velocity_mps: Float[np.ndarray, "B N 2"]  # v [m/s]
+    Positions and velocities have D axes: the two of the plane, or, of bodies, three.
+    """
+
+    position_m: Float[np.ndarray, "B N D"]  # p [m]
+    velocity_mps: Float[np.ndarray, "B N D"]  # v [m/s]
     is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and transmits; None: all robots
-    observed_m: Float[np.ndarray, "B N 2"] | None = None  # own position, with its error [m]
+    attitude: Float[np.ndarray, "B N 4"] | None = None  # quaternions of bodies; None: points
+    observed_m: Float[np.ndarray, "B N D"] | None = None  # own position, with its error [m]
 
     @property
-    def own_m(self) -> Float[np.ndarray, "B N 2"]:
+    def own_m(self) -> Float[np.ndarray, "B N D"]:
         """Where each robot observes itself to be: exactly at p unless it errs [m]."""
         return self.position_m if self.observed_m is None else self.observed_m
 

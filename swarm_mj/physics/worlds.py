@@ -18,7 +18,14 @@ from mujoco._structs import MjModel  # private: type checkers see it only there
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.obstacles import obstacles_of
-from swarm_mj.physics.scene import ROBOT_MASS_KG, Scene, compose, num_substeps, timestep_s
+from swarm_mj.physics.scene import (
+    ROBOT_MASS_KG,
+    Scene,
+    compiled_scene,
+    compose,
+    num_substeps,
+    timestep_s,
+)
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.system.compiled import compiled
 
@@ -46,14 +53,7 @@ class Physics:
             ValueError: The scene changes how robots move, or does not compile.
         """
         self._mission = mission
-        composed = compose(mission, scene=scene)
-        try:
-            self._model = composed.compile()
-        except ValueError as error:  # MuJoCo's, in several lines
-            if scene is None:
-                raise
-            said = " ".join(str(error).split())
-            raise ValueError(f"the scene does not compile: {said}") from error
+        self._model = compiled_scene(compose(mission, scene=scene), scene)
         if scene is not None:
             _check_free(self._model)
         found = obstacles_of(self._model)
@@ -69,7 +69,7 @@ class Physics:
         self.states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
 
     def place(
-        self, position_m: Float[np.ndarray, "B N 2"], velocity_mps: Float[np.ndarray, "B N 2"]
+        self, position_m: Float[np.ndarray, "B N D"], velocity_mps: Float[np.ndarray, "B N D"]
     ) -> None:
         """Restart all worlds from p_0 [m] and v_0 [m/s]; robots that collide must be apart."""
         self._batch.reset()
@@ -82,29 +82,16 @@ class Physics:
         """Make these the active robots from now on; the others keep moving."""
         self.states = replace(self.states, is_active=is_active)
 
-    def step(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> RobotStates:
+    def step(self, acceleration_mps2: Float[np.ndarray, "B N D"]) -> RobotStates:
         """Move all robots one window on, u clipped to A_max; ValueError for a wrong u (Eq. 15)."""
-        self._check_accelerations(acceleration_mps2)
+        check_accelerations(acceleration_mps2, self.states.position_m.shape)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)
         else:
             self._step_contact(acceleration_mps2)
         return self.states
 
-    def _check_accelerations(self, given: np.ndarray) -> None:
-        """Raise ValueError unless the controller gave one finite vector per robot."""
-        expected = self.states.position_m.shape
-        if given.shape != expected:
-            shape = f"{expected}, missions by robots by axes"
-            raise ValueError(f"acceleration must have shape {shape}, not {given.shape}")
-        if not _are_finite(given):
-            b, i, _ = np.argwhere(~np.isfinite(given))[0]
-            x, y = given[b, i]
-            raise ValueError(
-                f"acceleration must be finite, not ({x:g}, {y:g}) of robot {i} in mission {b}"
-            )
-
-    def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
+    def _step_exact(self, acceleration_mps2: Float[np.ndarray, "B N D"]) -> None:
         self._batch.step()
         shape = acceleration_mps2.shape
         is_active = self.states.is_active
@@ -126,7 +113,7 @@ class Physics:
             velocity=states.velocity_mps,
         )
 
-    def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N 2"]) -> None:
+    def _step_contact(self, acceleration_mps2: Float[np.ndarray, "B N D"]) -> None:
         if self._rests and not np.any(self._qvel) and not np.any(acceleration_mps2):
             return
         limit_mps = self._mission.max_velocity_mps
@@ -148,6 +135,17 @@ class Physics:
         )
 
 
+def check_accelerations(given: np.ndarray, expected: tuple[int, ...]) -> None:
+    """Raise ValueError unless the controller gave one finite vector per robot."""
+    if given.shape != expected:
+        shape = f"{expected}, missions by robots by axes"
+        raise ValueError(f"acceleration must have shape {shape}, not {given.shape}")
+    if not _are_finite(given):
+        b, i, _ = np.argwhere(~np.isfinite(given))[0]
+        vector = ", ".join(f"{number:g}" for number in given[b, i])
+        raise ValueError(f"acceleration must be finite, not ({vector}) of robot {i} in mission {b}")
+
+
 def _check_free(model: MjModel) -> None:
     """Raise ValueError if a scene made robots heavier or lighter, or tied them to anything."""
     is_tied = model.neq + model.ntendon > 0
@@ -159,7 +157,7 @@ def _check_free(model: MjModel) -> None:
 
 
 @compiled()
-def _are_finite(numbers: Float[np.ndarray, "B N 2"]) -> bool:
+def _are_finite(numbers: Float[np.ndarray, "B N D"]) -> bool:
     for number in numbers.flat:  # noqa: SIM110 - no generators in loops that numba compiles
         if not np.isfinite(number):
             return False
@@ -168,17 +166,17 @@ def _are_finite(numbers: Float[np.ndarray, "B N 2"]) -> bool:
 
 @compiled()
 def _kick(
-    qpos: Float[np.ndarray, "B N 2"],
-    qvel: Float[np.ndarray, "B N 2"],
-    ctrl: Float[np.ndarray, "B N 2"],
-    acceleration: Float[np.ndarray, "B N 2"],
+    qpos: Float[np.ndarray, "B N D"],
+    qvel: Float[np.ndarray, "B N D"],
+    ctrl: Float[np.ndarray, "B N D"],
+    acceleration: Float[np.ndarray, "B N D"],
     dt_s: float,
     limit_mps2: float,
     limit_mps: float,
     wall_m: float,
     clips: bool,  # the robot onto the wall, in place of its mirror image behind it
-    position: Float[np.ndarray, "B N 2"],
-    velocity: Float[np.ndarray, "B N 2"],
+    position: Float[np.ndarray, "B N D"],
+    velocity: Float[np.ndarray, "B N D"],
 ) -> None:
     """Accelerate, clip and reflect; qpos has already moved by v dt. Copy p and v."""
     num_missions, num_robots = acceleration.shape[:2]

@@ -50,7 +50,7 @@ class RoundRobin(CentralisedPolicy):
 
 @compiled()
 def _call_base(
-    position_m: Float[np.ndarray, "B N 2"],
+    position_m: Float[np.ndarray, "B N D"],
     now: Float[np.ndarray, "B"],
     recipient: Int[np.ndarray, "B N"],
 ) -> None:
@@ -60,7 +60,8 @@ def _call_base(
         base = 0
         nearest_m2 = np.inf
         for i in range(num_robots):
-            x, y = position_m[b, i]
+            x = position_m[b, i, 0]
+            y = position_m[b, i, 1]
             if x * x + y * y < nearest_m2:
                 base = i
                 nearest_m2 = x * x + y * y

@@ -43,14 +43,14 @@ WEIGHED_SLOTS = 20
 class _Scene:
     """The problem of one mission's last slot, and all that tells whether it is still the same."""
 
-    position_m: Float[np.ndarray, "N 2"]  # of its links
-    weighed_m: Float[np.ndarray, "N 2"]  # where robots were when its weights were worked out [m]
+    position_m: Float[np.ndarray, "N D"]  # of its links
+    weighed_m: Float[np.ndarray, "N D"]  # where robots were when its weights were worked out [m]
     weighed: float  # and when that was [slots]
     is_active: Bool[np.ndarray, "N"]
     problem: Problem
 
     def needs_weights(
-        self, now: float, position_m: Float[np.ndarray, "N 2"], is_active: Bool[np.ndarray, "N"]
+        self, now: float, position_m: Float[np.ndarray, "N D"], is_active: Bool[np.ndarray, "N"]
     ) -> bool:
         """Return whether news must be weighed anew: robots failed or came back, or moved on."""
         if not np.array_equal(self.is_active, is_active):
@@ -138,7 +138,7 @@ class LookaheadOracle(CentralisedPolicy):
         return scene.problem
 
     def _links(
-        self, b: int, position_m: Float[np.ndarray, "N 2"], is_active: Bool[np.ndarray, "N"]
+        self, b: int, position_m: Float[np.ndarray, "N D"], is_active: Bool[np.ndarray, "N"]
     ) -> Links:
         """Return the true links of a mission, of robots that have not failed."""
         links = self._truth.links(position_m, b)

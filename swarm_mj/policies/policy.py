@@ -255,8 +255,8 @@ class TeamView(NamedTuple):
     now: float  # t on the synchronised clock [windows]
     is_known: Bool[np.ndarray, "N N"]  # whether i knows anything of j
     timestamp: Float[np.ndarray, "N N"]  # T^{i,j} [windows]
-    position_m: Float[np.ndarray, "N N 2"]  # M^{i,j} [m]
-    velocity_mps: Float[np.ndarray, "N N 2"]  # M^{i,j} [m/s]
+    position_m: Float[np.ndarray, "N N D"]  # M^{i,j} [m]
+    velocity_mps: Float[np.ndarray, "N N D"]  # M^{i,j} [m/s]
     parent: Int[np.ndarray, "N N"]  # P^{i,j}
     heard: Int[np.ndarray, "N"]  # whom i decoded in the last slot; itself: nobody
 
@@ -306,7 +306,7 @@ class CentralisedPolicy(Policy, ABC):
         Args:
             views: What each robot knows, as in `DecentralisedPolicy.recipients`.
             states: Where all robots truly are [m] and how fast [m/s]: `position_m` and
-                `velocity_mps` [B N 2].
+                `velocity_mps` [B N D].
 
         Returns:
             Indices of robots, [B N]: at [b, i] the one that robot i addresses, or i itself for

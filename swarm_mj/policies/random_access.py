@@ -154,7 +154,7 @@ class Aloha(RandomTransmission, BroadcastPolicy):
 
 @compiled()
 def num_contenders(
-    is_known: Bool[np.ndarray, "B N N"], believed_m: Float[np.ndarray, "B N N 2"], range_m: float
+    is_known: Bool[np.ndarray, "B N N"], believed_m: Float[np.ndarray, "B N N D"], range_m: float
 ) -> Float[np.ndarray, "B N"]:
     """Return how many robots contend for each robot's neighbourhood, as far as it can tell.
 

@@ -119,6 +119,7 @@ class SpatialTdma(Tdma):
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        self._num_axes = mission.num_axes
         self._range_m = mission.range_m
         self._threshold = from_db(mission.sinr_threshold_db)
         self._law: PowerLaw | None = None  # of mean powers [noise]; None: that of free space
@@ -138,7 +139,9 @@ class SpatialTdma(Tdma):
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order, and forget powers; arguments as in `Policy.start`."""
         super().start(num_robots, rngs)
-        self._powers = None if self._law is None else no_powers(self._law, len(rngs))
+        self._powers = (
+            None if self._law is None else no_powers(self._law, len(rngs), self._num_axes)
+        )
         self._draws = Stream(rngs, uniform, (2, num_robots))  # common to all robots
         if self._contends:
             # Both of k as i knows, [b, i, k]: as `winners` has them.
@@ -203,7 +206,7 @@ def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
 @compiled()
 def leave_lost_owners(
     timestamp: Float[np.ndarray, "B N N"],
-    believed_m: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
     order: Int[np.ndarray, "B N"],
     turn: Int[np.ndarray, "B"],
     now: Float[np.ndarray, "B"],
@@ -235,7 +238,7 @@ def leave_lost_owners(
 @compiled()
 def winners(
     timestamp: Float[np.ndarray, "B N N"],
-    believed_m: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
     heard: Int[np.ndarray, "B N"],
     priority_draw: Float[np.ndarray, "B N"],
     rarity_draw: Float[np.ndarray, "B N"],

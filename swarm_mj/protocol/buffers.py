@@ -13,6 +13,7 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.timestamps import is_newer
 from swarm_mj.system.compiled import compiled
@@ -34,8 +35,8 @@ class Buffers:
     """
 
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j}: when j observed it [windows], or NEVER
-    position_m: Float[np.ndarray, "B N N 2"]  # M^{i,j}: where j was, as i knows it [m]
-    velocity_mps: Float[np.ndarray, "B N N 2"]  # M^{i,j}: how fast j was, as i knows it [m/s]
+    position_m: Float[np.ndarray, "B N N D"]  # M^{i,j}: where j was, as i knows it [m]
+    velocity_mps: Float[np.ndarray, "B N N D"]  # M^{i,j}: how fast j was, as i knows it [m/s]
     parent: Int[np.ndarray, "B N N"]  # P^{i,j}: whom j first passed it to, or NO_PARENT
     last_attempt: Float[np.ndarray, "B N N"]  # L^{i,j}: when i last addressed j [windows], or NEVER
     is_granted: Bool[np.ndarray, "B"]  # all states at t = 0 were known: then NEVER means T = 0
@@ -61,13 +62,13 @@ class Buffers:
         return Buffers(**views)
 
 
-def empty_buffers(num_missions: int, num_robots: int) -> Buffers:
+def empty_buffers(num_missions: int, num_robots: int, num_axes: int = PLANE) -> Buffers:
     """Return buffers before the first observation: everything unknown."""
     shape = num_missions, num_robots, num_robots
     return Buffers(
         timestamp=np.full(shape, NEVER),
-        position_m=np.zeros((*shape, 2)),
-        velocity_mps=np.zeros((*shape, 2)),
+        position_m=np.zeros((*shape, num_axes)),
+        velocity_mps=np.zeros((*shape, num_axes)),
         parent=np.full(shape, NO_PARENT, dtype=np.int32),
         last_attempt=np.full(shape, NEVER),
         is_granted=np.zeros(num_missions, dtype=np.bool_),
@@ -84,10 +85,10 @@ def grant_start(buffers: Buffers, states: RobotStates) -> None:
 @compiled()
 def write_own(
     timestamp: Float[np.ndarray, "B N N"],
-    believed_m: Float[np.ndarray, "B N N 2"],
-    believed_mps: Float[np.ndarray, "B N N 2"],
-    observed_m: Float[np.ndarray, "B N 2"],
-    observed_mps: Float[np.ndarray, "B N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
+    believed_mps: Float[np.ndarray, "B N N D"],
+    observed_m: Float[np.ndarray, "B N D"],
+    observed_mps: Float[np.ndarray, "B N D"],
     now: Float[np.ndarray, "B"],
     is_active: Bool[np.ndarray, "B N"] | None,
 ) -> None:
@@ -97,10 +98,10 @@ def write_own(
 
     Args:
         timestamp: T of the robots' buffers, [B N N], [windows]; written, as the next two are.
-        believed_m: The positions of M, [B N N 2], [m].
-        believed_mps: The velocities of M, [B N N 2], [m/s].
-        observed_m: Where each robot observes itself to be, [B N 2], [m].
-        observed_mps: How fast it observes itself to be, [B N 2], [m/s].
+        believed_m: The positions of M, [B N N D], [m].
+        believed_mps: The velocities of M, [B N N D], [m/s].
+        observed_m: Where each robot observes itself to be, [B N D], [m].
+        observed_mps: How fast it observes itself to be, [B N D], [m/s].
         now: t, [B], [windows].
         is_active: Who observes anything, [B N]; None is everyone.
     """
@@ -111,7 +112,7 @@ def write_own(
             if is_active is not None and not is_active[b, i]:
                 continue
             timestamp[b, i, i] = now[b]
-            for axis in range(2):
+            for axis in range(observed_m.shape[2]):
                 believed_m[b, i, i, axis] = observed_m[b, i, axis]
                 believed_mps[b, i, i, axis] = observed_mps[b, i, axis]
 
@@ -182,8 +183,8 @@ def merge_newer(
     sent: Float[np.ndarray, "B N N"],
     heard: Int[np.ndarray, "B N"],
     timestamp: Float[np.ndarray, "B N N"],
-    believed_m: Float[np.ndarray, "B N N 2"],
-    believed_mps: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
+    believed_mps: Float[np.ndarray, "B N N D"],
     parent: Int[np.ndarray, "B N N"],
 ) -> None:
     """Replace all entries by those strictly newer in the packet each robot decoded (Eq. 8).
@@ -199,8 +200,8 @@ def merge_newer(
             it left out; `timestamp` itself if packets hold whole buffers.
         heard: The sender that each robot decoded, [B N]; itself is nobody.
         timestamp: T of the robots' buffers, [B N N], [windows]; written, as all that follow.
-        believed_m: The positions of M, [B N N 2], [m].
-        believed_mps: The velocities of M, [B N N 2], [m/s].
+        believed_m: The positions of M, [B N N D], [m].
+        believed_mps: The velocities of M, [B N N D], [m/s].
         parent: P, [B N N].
     """
     for b in range(heard.shape[0]):
@@ -231,13 +232,13 @@ def merge_newer(
 @compiled()
 def _merge_written(
     sent: Float[np.ndarray, "B N N"],
-    sent_m: Float[np.ndarray, "B N N 2"],
-    sent_mps: Float[np.ndarray, "B N N 2"],
+    sent_m: Float[np.ndarray, "B N N D"],
+    sent_mps: Float[np.ndarray, "B N N D"],
     sent_parent: Int[np.ndarray, "B N N"],
     heard: Int[np.ndarray, "B N"],
     timestamp: Float[np.ndarray, "B N N"],
-    believed_m: Float[np.ndarray, "B N N 2"],
-    believed_mps: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
+    believed_mps: Float[np.ndarray, "B N N D"],
     parent: Int[np.ndarray, "B N N"],
 ) -> None:
     """Merge packets that were written from other arrays than those that are merged into."""
@@ -258,13 +259,13 @@ def _merge_written(
 @compiled()
 def _take_newer(
     sent_t: Float[np.ndarray, "N N"],
-    sent_m: Float[np.ndarray, "N N 2"],
-    sent_mps: Float[np.ndarray, "N N 2"],
+    sent_m: Float[np.ndarray, "N N D"],
+    sent_mps: Float[np.ndarray, "N N D"],
     sent_parent: Int[np.ndarray, "N N"],
     heard: Int[np.ndarray, "N"],
     timestamp: Float[np.ndarray, "N N"],
-    believed_m: Float[np.ndarray, "N N 2"],
-    believed_mps: Float[np.ndarray, "N N 2"],
+    believed_m: Float[np.ndarray, "N N D"],
+    believed_mps: Float[np.ndarray, "N N D"],
     parent: Int[np.ndarray, "N N"],
 ) -> None:
     """Replace the entries of one mission's robots by newer ones in packets."""
@@ -276,7 +277,7 @@ def _take_newer(
         for k in range(num_robots):
             if is_newer(sent_t[j, k], timestamp[i, k]):
                 timestamp[i, k] = sent_t[j, k]
-                for axis in range(2):
+                for axis in range(sent_m.shape[2]):
                     believed_m[i, k, axis] = sent_m[j, k, axis]
                     believed_mps[i, k, axis] = sent_mps[j, k, axis]
                 parent[i, k] = i if k == j else _kept_parent(sent_parent[j, k], sent_t, j)

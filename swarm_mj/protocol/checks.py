@@ -47,7 +47,7 @@ def as_array(what: str, given: object) -> np.ndarray:
 
 
 def checked_decode(
-    channel: Channel, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
+    channel: Channel, position_m: Float[np.ndarray, "B N D"], recipient: Int[np.ndarray, "B N"]
 ) -> Int[np.ndarray, "B N"]:
     """Return whose packet each robot decodes; arguments as in `Channel`.
 

@@ -21,8 +21,8 @@ class KnownArrays(NamedTuple):
     """The arrays of `Buffers` that a window writes: all that robots know of each other."""
 
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
-    believed_m: Float[np.ndarray, "B N N 2"]  # of M^{i,j}: the buffers' `position_m`
-    believed_mps: Float[np.ndarray, "B N N 2"]  # of M^{i,j}: the buffers' `velocity_mps`
+    believed_m: Float[np.ndarray, "B N N D"]  # of M^{i,j}: the buffers' `position_m`
+    believed_mps: Float[np.ndarray, "B N N D"]  # of M^{i,j}: the buffers' `velocity_mps`
     parent: Int[np.ndarray, "B N N"]  # P^{i,j}
     last_attempt: Float[np.ndarray, "B N N"]  # L^{i,j} [windows]
 
@@ -30,9 +30,9 @@ class KnownArrays(NamedTuple):
 class TrueArrays(NamedTuple):
     """The robots as they are: the arrays of `RobotStates`."""
 
-    true_m: Float[np.ndarray, "B N 2"]
-    observed_m: Float[np.ndarray, "B N 2"]  # its own place, as each robot observes it
-    observed_mps: Float[np.ndarray, "B N 2"]  # its own velocity, which it observes without error
+    true_m: Float[np.ndarray, "B N D"]
+    observed_m: Float[np.ndarray, "B N D"]  # its own place, as each robot observes it
+    observed_mps: Float[np.ndarray, "B N D"]  # its own velocity, which it observes without error
     is_active: Bool[np.ndarray, "B N"] | None  # None is compiled apart, as all of them
 
 

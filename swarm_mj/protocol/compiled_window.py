@@ -121,13 +121,13 @@ def _play(
 @compiled()
 def _compiled_play(
     timestamp: Float[np.ndarray, "B N N"],
-    believed_m: Float[np.ndarray, "B N N 2"],
-    believed_mps: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
+    believed_mps: Float[np.ndarray, "B N N D"],
     parent: Int[np.ndarray, "B N N"],
     last_attempt: Float[np.ndarray, "B N N"],
-    true_m: Float[np.ndarray, "B N 2"],
-    observed_m: Float[np.ndarray, "B N 2"],
-    observed_mps: Float[np.ndarray, "B N 2"],
+    true_m: Float[np.ndarray, "B N D"],
+    observed_m: Float[np.ndarray, "B N D"],
+    observed_mps: Float[np.ndarray, "B N D"],
     is_active: Bool[np.ndarray, "B N"] | None,
     received_at_1_m_mw: float,
     noise_mw: float,

@@ -42,7 +42,7 @@ def age_of_information(
 
 @compiled()
 def velocity_variance(
-    velocity_mps: Float[np.ndarray, "B N 2"], is_active: Bool[np.ndarray, "B N"] | None = None
+    velocity_mps: Float[np.ndarray, "B N D"], is_active: Bool[np.ndarray, "B N"] | None = None
 ) -> Float[np.ndarray, "B"]:
     """Return the velocity variance of the active team, per mission [m²/s²] (Eq. 17)."""
     variance = np.empty(velocity_mps.shape[0])
@@ -50,7 +50,7 @@ def velocity_variance(
         active_mps = velocity_mps[b] if is_active is None else velocity_mps[b][is_active[b]]
         total = 0.0
         num_active = active_mps.shape[0]
-        for axis in range(2):
+        for axis in range(velocity_mps.shape[2]):
             mean = 0.0
             for i in range(num_active):
                 mean += active_mps[i, axis] / num_active
@@ -176,7 +176,7 @@ def _mean_age(
 def _measure(
     timestamp: Float[np.ndarray, "B N N"],
     now: Float[np.ndarray, "B"],
-    velocity_mps: Float[np.ndarray, "B N 2"],
+    velocity_mps: Float[np.ndarray, "B N D"],
     is_active: Bool[np.ndarray, "B N"] | None,
     first_recipient: Int[np.ndarray, "B N"],
     first_heard: Int[np.ndarray, "B N"],

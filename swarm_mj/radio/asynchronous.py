@@ -78,7 +78,7 @@ class AsynchronousChannel:
 
     def _heard(
         self,
-        position_m: Float[np.ndarray, "B N 2"],
+        position_m: Float[np.ndarray, "B N D"],
         recipient: Int[np.ndarray, "B N"],
         slot: Int[np.ndarray, "B"],
         mission: Int[np.ndarray, "B"],

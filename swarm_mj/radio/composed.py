@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.radio.fading import (
     NO_FADING,
     Waves,
@@ -66,16 +67,18 @@ class ComposedChannel:
         *,
         shadowing_db: float = 0.0,
         shadowing_distance_m: float = 1.0,
+        num_axes: int = PLANE,
     ) -> None:
         self.reception = reception
         self._law = law
+        self._num_axes = num_axes  # of positions
         self._shadowing_db = shadowing_db
         self._shadowing_distance_m = shadowing_distance_m
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Start new missions; one generator each, from which its own shadowing is drawn, too."""
         self.key = np.array([rng.integers(2**64, dtype=np.uint64) for rng in rngs])
-        self._powers_mw = no_powers(self._law, len(rngs))
+        self._powers_mw = no_powers(self._law, len(rngs), self._num_axes)
         self._waves: Waves | None = None
         if self._shadowing_db > 0.0:
             self._waves = draw_waves(
@@ -88,7 +91,7 @@ class ComposedChannel:
 
     def _heard(
         self,
-        position_m: Float[np.ndarray, "W N 2"],
+        position_m: Float[np.ndarray, "W N D"],
         recipient: Int[np.ndarray, "W N"],
         slot: Int[np.ndarray, "W"],
         mission: Int[np.ndarray, "W"],
@@ -99,7 +102,7 @@ class ComposedChannel:
 
     def received_mw(
         self,
-        position_m: Float[np.ndarray, "W N 2"],
+        position_m: Float[np.ndarray, "W N D"],
         mission: Int[np.ndarray, "W"],
         is_sender: Bool[np.ndarray, "W N"],
     ) -> Float[np.ndarray, "B N N"]:
@@ -111,14 +114,14 @@ class ComposedChannel:
         return self._powers_mw.power
 
     def mean_powers_mw(
-        self, position_m: Float[np.ndarray, "N 2"], mission: int
+        self, position_m: Float[np.ndarray, "N D"], mission: int
     ) -> Float[np.ndarray, "N N"]:
         """Return the power of each robot of a mission at each other before fades [mW]."""
         everyone = np.ones((1, len(position_m)), dtype=np.bool_)
         return self.received_mw(position_m[None], np.array([mission]), everyone)[mission].copy()
 
     def largest_part(
-        self, position_m: Float[np.ndarray, "N 2"], mission: int
+        self, position_m: Float[np.ndarray, "N D"], mission: int
     ) -> Bool[np.ndarray, "N"]:
         """Return the largest group of a mission's robots in which everyone reaches everyone.
 
@@ -143,7 +146,7 @@ def strong_groups(is_linked: Bool[np.ndarray, "N N"]) -> Int[np.ndarray, "N"]:
 def _update_powers(
     powers_mw: MeanPowers,
     waves: Waves | None,
-    position_m: Float[np.ndarray, "W N 2"],
+    position_m: Float[np.ndarray, "W N D"],
     mission: Int[np.ndarray, "W"],
     is_sender: Bool[np.ndarray, "W N"],
 ) -> None:

@@ -112,7 +112,7 @@ class Waves(NamedTuple):
     first_end: Float[np.ndarray, "B W 2"]  # angular wave numbers [rad/m]
     other_end: Float[np.ndarray, "B W 2"]  # [rad/m]
     phase: Float[np.ndarray, "B W"]  # counted to the other end [rad]
-    place: Float[np.ndarray, "B N 2"]  # of each robot, in steps; nan before it has one
+    place: Float[np.ndarray, "B N 2"]  # of each robot on the map, in steps; nan before it has one
     ends: Float32[np.ndarray, "B N E W"]  # of what each robot is to a wave: `FIRST_COS` and so on
     step_m: float  # places are rounded to multiples of this
     std_db: float
@@ -153,7 +153,7 @@ def draw_waves(
 
 
 @compiled()
-def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N 2"]) -> None:
+def follow_robots(waves: Waves, b: int, position_m: Float[np.ndarray, "N D"]) -> None:
     """Bring mission b's waves to where its robots are; cosines, which cost most, once a place."""
     first_end = waves.first_end[b]
     other_end = waves.other_end[b]

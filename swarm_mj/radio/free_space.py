@@ -37,12 +37,12 @@ class Channel(Protocol):
     """
 
     def __call__(
-        self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
+        self, position_m: Float[np.ndarray, "B N D"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes.
 
         Args:
-            position_m: Where each robot is [m], [B N 2]: missions, robots, axes.
+            position_m: Where each robot is [m], [B N D]: missions, robots, axes.
             recipient: Whom each robot addresses, [B N]; -1 is everyone, and itself is silence.
 
         Returns:
@@ -122,7 +122,7 @@ class FreeSpaceRadio:
         return self.power_mw * channel_gain(path_loss_db(1.0, self.frequency_hz))
 
     def __call__(
-        self, position_m: Float[np.ndarray, "B N 2"], recipient: Int[np.ndarray, "B N"]
+        self, position_m: Float[np.ndarray, "B N D"], recipient: Int[np.ndarray, "B N"]
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes (Eqs. 1-4); arguments as in `Channel`."""
         return decode_strongest(
@@ -137,7 +137,7 @@ class FreeSpaceRadio:
 
 @compiled()
 def decode_strongest(
-    position_m: Float[np.ndarray, "B N 2"],
+    position_m: Float[np.ndarray, "B N D"],
     recipient: Int[np.ndarray, "B N"],
     received_at_1_m_mw: float,
     noise_mw: float,

@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.effects import model_of
 from swarm_mj.radio.mission_radio import radio_of
@@ -41,7 +42,7 @@ class GainTable(ComposedChannel):
 
         radio = radio_of(mission)
         model = model_of(radio, mission.num_robots, effects=[])
-        super().__init__(model.law, model.reception)
+        super().__init__(model.law, model.reception, num_axes=mission.num_axes)
         rows = np.empty(0)
         with open_file(path, "table of gains") as file:
             header = file.readline().decode("utf-8-sig").strip()
@@ -65,7 +66,7 @@ class GainTable(ComposedChannel):
 
     def received_mw(
         self,
-        position_m: Float[np.ndarray, "W N 2"],
+        position_m: Float[np.ndarray, "W N D"],
         mission: Int[np.ndarray, "W"],
         is_sender: Bool[np.ndarray, "W N"],
     ) -> Float[np.ndarray, "B N N"]:
@@ -73,7 +74,9 @@ class GainTable(ComposedChannel):
         power_mw = super().received_mw(position_m, mission, is_sender).copy()
         for b, place_m, sends in zip(mission, position_m, is_sender, strict=True):
             i, j = np.nonzero(sends[:, np.newaxis] & ~np.eye(len(sends), dtype=np.bool_))
-            away_m, pair = self._pairs.query(np.hstack([place_m[i], place_m[j]]), NUM_NEAREST)
+            away_m, pair = self._pairs.query(
+                np.hstack([place_m[i, :PLANE], place_m[j, :PLANE]]), NUM_NEAREST
+            )
             weight = np.maximum(away_m, MIN_DISTANCE_M) ** -2.0  # Shepard 1968
             beyond_db = np.sum(weight * self._beyond_db[pair], axis=1) / np.sum(weight, axis=1)
             power_mw[b, i, j] *= from_db(beyond_db)

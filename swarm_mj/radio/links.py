@@ -73,7 +73,7 @@ def among(links: Links, takes_part: Bool[np.ndarray, "N"]) -> Links:
 
 def links_between(
     radio: FreeSpaceRadio,
-    position_m: Float[np.ndarray, "N 2"],
+    position_m: Float[np.ndarray, "N D"],
     spread_m: Float[np.ndarray, "N"] | None = None,
     is_known: Bool[np.ndarray, "N"] | None = None,
     law: PowerLaw | None = None,
@@ -82,7 +82,7 @@ def links_between(
 
     Args:
         radio: Whose powers, noise and threshold they have.
-        position_m: Where each robot is believed to be [m], [N 2].
+        position_m: Where each robot is believed to be [m], [N D].
         spread_m: Standard deviation of each belief [m], [N]; None: the positions are true.
         is_known: Whether a robot is known to be anywhere, [N]; others hear nothing and are not
             heard. None: everyone is known.

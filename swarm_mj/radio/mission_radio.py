@@ -43,7 +43,7 @@ class Belief:
 
     def links(
         self,
-        position_m: Float[np.ndarray, "N 2"],
+        position_m: Float[np.ndarray, "N D"],
         spread_m: Float[np.ndarray, "N"] | None = None,
         is_known: Bool[np.ndarray, "N"] | None = None,
     ) -> Links:
@@ -66,7 +66,7 @@ class TrueLinks:
     channel: ComposedChannel | None = None  # None: in free space, or a user's own, which is unknown
 
     def mean_powers_mw(
-        self, position_m: Float[np.ndarray, "N 2"], mission: int
+        self, position_m: Float[np.ndarray, "N D"], mission: int
     ) -> Float[np.ndarray, "N N"]:
         """Return the power of each robot of a mission at each other before fades [mW]."""
         if self.channel is None:
@@ -74,7 +74,7 @@ class TrueLinks:
             return powers_between(position_m, law)
         return self.channel.mean_powers_mw(position_m, mission)
 
-    def links(self, position_m: Float[np.ndarray, "N 2"], mission: int) -> Links:
+    def links(self, position_m: Float[np.ndarray, "N D"], mission: int) -> Links:
         """Return the links between true positions of one mission, which has its own shadowing."""
         links = links_between(self.radio, position_m)
         if self.channel is None:
@@ -155,6 +155,7 @@ def mission_radio(
         model.reception,
         shadowing_db=model.shadowing_db,
         shadowing_distance_m=model.shadowing_distance_m,
+        num_axes=mission.num_axes,
     )
     truth = TrueLinks(radio=radio, channel=composed)
     if model.clock_offset == 0.0 and model.clock_drift == 0.0:

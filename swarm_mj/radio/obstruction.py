@@ -11,6 +11,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.state import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
 from swarm_mj.system.compiled import compiled
 
@@ -23,34 +24,44 @@ EMPTY: Interval = (1.0, 0.0)
 @compiled()
 def obstruct(
     i: int,
-    position_m: Float[np.ndarray, "N 2"],
+    position_m: Float[np.ndarray, "N D"],
     height_m: float,
     obstacles: Obstacles | None,
     power: Float[np.ndarray, "N"],
 ) -> None:
-    """Multiply i's power at all others by what obstacles leave, at the antennas' height [m]."""
+    """Multiply i's power at all others by what obstacles leave.
+
+    In the plane all antennas are at this height [m]; in space each is where its robot is.
+    """
     if obstacles is None:  # code for obstacles is then not even compiled
         return
     x = position_m[i, 0]
     y = position_m[i, 1]
+    has_heights = position_m.shape[1] > PLANE
+    z = position_m[i, 2] if has_heights else height_m
     for j in range(position_m.shape[0]):
         if j != i:
-            along_m = (position_m[j, 0] - x, position_m[j, 1] - y, 0.0)
-            power[j] *= power_through((x, y, height_m), along_m, obstacles)
+            climb_m = position_m[j, 2] - z if has_heights else 0.0
+            along_m = (position_m[j, 0] - x, position_m[j, 1] - y, climb_m)
+            power[j] *= power_through((x, y, z), along_m, obstacles)
 
 
 @compiled()
 def blocked(
-    position_m: Float[np.ndarray, "N 2"], height_m: float, radius_m: float, obstacles: Obstacles
+    position_m: Float[np.ndarray, "N D"],
+    height_m: Float[np.ndarray, "N"],
+    radius_m: Float[np.ndarray, "N"],
+    obstacles: Obstacles,
 ) -> Bool[np.ndarray, "N"]:
-    """Return which robots, at this height [m], touch an obstacle, by four lines across each."""
+    """Return which robots, at their heights [m], touch an obstacle, by four lines across each."""
     touches = np.zeros(position_m.shape[0], dtype=np.bool_)
     for i in range(position_m.shape[0]):
         for turn in range(4):
             x = math.cos(0.25 * math.pi * turn)
             y = math.sin(0.25 * math.pi * turn)
-            start_m = (position_m[i, 0] - radius_m * x, position_m[i, 1] - radius_m * y, height_m)
-            along_m = (2.0 * radius_m * x, 2.0 * radius_m * y, 0.0)
+            r = radius_m[i]
+            start_m = (position_m[i, 0] - r * x, position_m[i, 1] - r * y, height_m[i])
+            along_m = (2.0 * r * x, 2.0 * r * y, 0.0)
             touches[i] |= _next_crossed(start_m, along_m, 0, obstacles) < obstacles.kind.shape[0]
     return touches
 

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.mission.geometry import squared_distance
+from swarm_mj.mission.geometry import PLANE, squared_distance
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
 from swarm_mj.radio.fading import Waves, follow_robots, shadow
 from swarm_mj.radio.obstruction import obstruct
@@ -39,17 +39,17 @@ class MeanPowers(NamedTuple):
     """
 
     law: PowerLaw
-    position_m: Float[np.ndarray, "B N 2"]  # what the powers are for [m]; nan before the first
+    position_m: Float[np.ndarray, "B N D"]  # what the powers are for [m]; nan before the first
     is_done: Bool[np.ndarray, "B N"]  # whose powers are computed for that
     power: Float[np.ndarray, "B N N"]  # of i at j, in the law's unit; of others, anything
 
 
-def no_powers(law: PowerLaw, num_missions: int) -> MeanPowers:
+def no_powers(law: PowerLaw, num_missions: int, num_axes: int = PLANE) -> MeanPowers:
     """Return no powers so far, by this law."""
     shape = num_missions, len(law.at_1_m)
     return MeanPowers(
         law=law,
-        position_m=np.full((*shape, 2), np.nan),
+        position_m=np.full((*shape, num_axes), np.nan),
         is_done=np.zeros(shape, dtype=np.bool_),
         power=np.empty((*shape, shape[1])),
     )
@@ -84,7 +84,7 @@ def power_after(
 
 @compiled()
 def write_powers(
-    i: int, position_m: Float[np.ndarray, "N 2"], law: PowerLaw, power: Float[np.ndarray, "N"]
+    i: int, position_m: Float[np.ndarray, "N D"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
     """Fill `power`: the mean power of i's packets at every robot; nobody receives itself."""
     for j in range(position_m.shape[0]):
@@ -96,7 +96,7 @@ def write_powers(
 
 @compiled()
 def place_robots(
-    powers: MeanPowers, b: int, position_m: Float[np.ndarray, "N 2"], waves: Waves | None = None
+    powers: MeanPowers, b: int, position_m: Float[np.ndarray, "N D"], waves: Waves | None = None
 ) -> None:
     """Forget the powers of mission b if its robots are elsewhere now; None is no shadowing."""
     # Any one that moved makes all powers at it change, not only its own.
@@ -118,7 +118,7 @@ def compute_powers(powers: MeanPowers, b: int, i: int, waves: Waves | None = Non
 
 
 @compiled()
-def powers_between(position_m: Float[np.ndarray, "N 2"], law: PowerLaw) -> Float[np.ndarray, "N N"]:
+def powers_between(position_m: Float[np.ndarray, "N D"], law: PowerLaw) -> Float[np.ndarray, "N N"]:
     """Return the mean power of every i at every j."""
     power = np.empty((position_m.shape[0], position_m.shape[0]))
     for i in range(power.shape[0]):

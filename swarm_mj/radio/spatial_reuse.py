@@ -28,7 +28,7 @@ class _Belief(NamedTuple):
     that tables, which hold whole rows, would take ten times as long.
     """
 
-    believed_m: Float[np.ndarray, "N 2"]
+    believed_m: Float[np.ndarray, "N D"]
     at_1_m: float  # in free space
     power: Float[np.ndarray, "N N"]  # by a law, rows as far as they are computed
     threshold: float
@@ -62,7 +62,7 @@ def empty_slot(num_robots: int) -> Slot:
 
 @compiled(makes_arrays=False)
 def write_joined(
-    believed_m: Float[np.ndarray, "N 2"],
+    believed_m: Float[np.ndarray, "N D"],
     is_known: Bool[np.ndarray, "N"],
     turn: int,
     asked: Int[np.ndarray, "N"],
@@ -97,7 +97,7 @@ def write_joined(
 
 @compiled()
 def keep_joined(
-    believed_m: Float[np.ndarray, "B N N 2"],
+    believed_m: Float[np.ndarray, "B N N D"],
     order: Int[np.ndarray, "B N"],
     turn: Int[np.ndarray, "B"],
     range_m: float,

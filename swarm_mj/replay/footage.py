@@ -104,7 +104,7 @@ class Footage:
 
     facts: Facts
     window: Int[np.ndarray, "T"]  # 1 is the mission's first
-    position_m: Positions  # p
+    position_m: Positions  # p on the map
     velocity_mps: Float[np.ndarray, "T N 2"]  # v; of a replay that was read, of any length
     is_on: Bool[np.ndarray, "T N"]  # whether a robot had not failed
     known_age: Float[np.ndarray, "T N"]  # of what the ego robot knows [windows]; nan: nothing
@@ -113,6 +113,8 @@ class Footage:
     packets: dict[Fate, PacketPaths]  # by their fate, in the order of drawing
     mismatch: LinkMismatch  # has no snapshots in free space
     ground: Ground  # that pictures show
+    height_m: Float[np.ndarray, "T N"] | None = None  # of bodies; None: robots are points
+    attitude: Float[np.ndarray, "T N 4"] | None = None  # of bodies: quaternions
     scene: Scene | None = None  # what changed the arena; files have its name only
 
     @property
@@ -149,8 +151,13 @@ class Footage:
                 row=packets.row[first:after],
                 start_m=packets.start_m[first:after],
                 end_m=packets.end_m[first:after],
+                up_m=None if packets.up_m is None else packets.up_m[first:after],
             )
         return found
+
+    def above(self, base_m: float) -> float | Float[np.ndarray, "T N"]:
+        """Return how high is what is drawn so far above each robot [m]."""
+        return base_m if self.height_m is None else self.height_m + base_m
 
     def is_own(self, links: LinkRows) -> Bool[np.ndarray, "L"]:
         """Tell which links are the observer's: in a city, all of them would hide the robots."""

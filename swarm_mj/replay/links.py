@@ -59,12 +59,18 @@ class PacketPaths(NamedTuple):
     """L packets with the same fate, sorted by window."""
 
     row: Int[np.ndarray, "L"]  # the window, 0 to T - 1
-    start_m: Points  # where the sender is
+    start_m: Points  # where the sender is on the map
     end_m: Points  # where the receiver is
+    up_m: Float[np.ndarray, "L 2"] | None = None  # how high both are; None: they are points
 
 
 def fates(
-    recipient: Phases, heard: Phases, position_m: Positions, *, is_broadcast: bool
+    recipient: Phases,
+    heard: Phases,
+    position_m: Positions,
+    *,
+    is_broadcast: bool,
+    height_m: Float[np.ndarray, "T N"] | None = None,
 ) -> dict[Fate, PacketPaths]:
     """Sort the packets of T windows by their fate, in the order of drawing.
 
@@ -72,7 +78,7 @@ def fates(
     `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
     k other robots overheard is k packets here. Broadcasts have no addressee: `heard` leads to each
     hearer. The second phase answers the first. `recipient` is S^i in both phases, `heard` the
-    sender that each robot decoded; a robot's own number is none.
+    sender that each robot decoded; a robot's own number is none. `height_m` is that of bodies.
     """
     # A robot decodes at most one packet in a phase, so `heard` has every reception once.
     row, phase, hearer = np.nonzero(is_other(heard))
@@ -98,7 +104,10 @@ def fates(
     for fate, (row, sender, receiver) in found.items():
         start_m = position_m[row, sender]
         end_m = position_m[row, receiver]
-        paths[fate] = PacketPaths(row=row, start_m=start_m, end_m=end_m)
+        up_m = None
+        if height_m is not None:
+            up_m = np.stack([height_m[row, sender], height_m[row, receiver]], axis=1)
+        paths[fate] = PacketPaths(row=row, start_m=start_m, end_m=end_m, up_m=up_m)
     return paths
 
 
@@ -107,9 +116,12 @@ def is_other(robot: Phases) -> Bool[np.ndarray, "T 2 N"]:
     return robot != np.arange(robot.shape[2])
 
 
-def lifted(at_m: Float[np.ndarray, "*S 2"], height_m: float) -> Float[np.ndarray, "*S 3"]:
-    """Return points at a height above the ground [m]."""
-    return np.insert(at_m, 2, height_m, axis=-1)
+def lifted(
+    at_m: Float[np.ndarray, "*S 2"], height_m: float | Float[np.ndarray, "*S"]
+) -> Float[np.ndarray, "*S 3"]:
+    """Return points at a height above the ground, one for all or each its own [m]."""
+    up_m = np.broadcast_to(height_m, at_m.shape[:-1])
+    return np.concatenate([at_m, up_m[..., None]], axis=-1)
 
 
 def flattened(at_m: Float[np.ndarray, "*S 3"]) -> Float[np.ndarray, "*S 2"]:
@@ -118,7 +130,7 @@ def flattened(at_m: Float[np.ndarray, "*S 3"]) -> Float[np.ndarray, "*S 2"]:
 
 
 def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.ndarray, "L P 3"]:
-    """Return points along parabolas that start and end at `base_m` above the ground [m].
+    """Return points along parabolas that start and end at `base_m` above the robots' places [m].
 
     They cover this share of the way to the receiver: lost packets stop short of it.
     """
@@ -127,6 +139,9 @@ def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.nd
     span_m = np.linalg.norm(way_m, axis=1)
     # The longer the higher: packets that cross on the ground stay apart in the picture.
     height_m = base_m + 4.0 * RISE * span_m[:, None] * along * (1.0 - along)
+    if packets.up_m is not None:
+        start_m, end_m = packets.up_m.T
+        height_m = height_m + start_m[:, None] + share * along * (end_m - start_m)[:, None]
     ground_m = packets.start_m[:, None] + along[:, None] * way_m[:, None]
     return np.concatenate([ground_m, height_m[..., None]], axis=2)
 

@@ -17,6 +17,7 @@ from rerun.chunk import RrdReader
 
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.replay import layers, palette
+from swarm_mj.replay.bodies import body_of
 from swarm_mj.replay.export.flown import FlownWindows
 from swarm_mj.replay.footage import Facts, Footage, shown_ground
 from swarm_mj.replay.layer_kinds import Entity, Lines3D, of_others
@@ -119,6 +120,9 @@ def _footage(facts: Facts, columns: Columns) -> Footage:
     position_m = centres_m[..., :2]
     is_on = _numbers(columns[robots, "is_on"]).reshape(age.shape) > 0.0
     velocity_mps = np.zeros((*age.shape, 2))
+    height_m = attitude = None
+    if facts.mission.has_bodies:
+        height_m, attitude = _bodies(columns, facts.mission.num_robots)
     headings = columns.get((layers.SCENE_HEADINGS.path, "LineStrips3D:strips"))
     if headings is not None:  # teams at rest have none
         start_m, end_m = np.moveaxis(_numbers(headings).reshape(*age.shape, 2, 3), 2, 0)
@@ -136,9 +140,11 @@ def _footage(facts: Facts, columns: Columns) -> Footage:
         is_cut_off=is_cut_off,
         mismatch=_mismatch(columns),
         is_on=is_on,
-        packets=_packets(columns),
+        packets=_packets(columns, has_bodies=facts.mission.has_bodies),
         age_mean=_numbers(columns[layers.MEAN_AGE.path, "Measurements:values"]),
         ground=shown_ground(position_m, facts.mission),
+        height_m=height_m,
+        attitude=attitude,
     )
 
 
@@ -158,17 +164,38 @@ def _columns(path: Path, contents: Sequence[str]) -> Columns:
     return columns
 
 
-def _packets(columns: Columns) -> dict[Fate, PacketPaths]:
+def _bodies(
+    columns: Columns, num_robots: int
+) -> tuple[Float[np.ndarray, "T N"], Float[np.ndarray, "T N 4"]]:
+    """Return the heights and attitudes of robots with bodies."""
+    height_m = []
+    attitude = []
+    for i in range(num_robots):
+        path = body_of(i).path
+        place_m = _numbers(columns[path, "Transform3D:translation"]).reshape(-1, 3)
+        real_last = _numbers(columns[path, "Transform3D:quaternion"]).reshape(-1, 4)
+        height_m.append(place_m[:, 2])
+        attitude.append(real_last[:, [3, 0, 1, 2]])
+    return np.stack(height_m, axis=1), np.stack(attitude, axis=1)
+
+
+def _packets(columns: Columns, *, has_bodies: bool) -> dict[Fate, PacketPaths]:
     found: dict[Fate, PacketPaths] = {}
     for fate, style in palette.PACKETS.items():
         strips = columns.get((layers.PACKET_ARCS[fate].path, "LineStrips3D:strips"))
         if strips is None:  # addressed packets have other fates than broadcasts
             continue
-        points_m = flattened(_numbers(strips).reshape(-1, SEGMENTS + 1, 3))
+        raised_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
+        points_m = flattened(raised_m)
         start_m = points_m[:, 0]  # the first point of each arc, and the last:
         # From the way that is drawn to the whole one.
         way_m = (points_m[:, -1] - start_m) / style.share
-        found[fate] = PacketPaths(row=_rows(strips), start_m=start_m, end_m=start_m + way_m)
+        found[fate] = PacketPaths(
+            row=_rows(strips),
+            start_m=start_m,
+            end_m=start_m + way_m,
+            up_m=raised_m[:, [0, -1], 2] if has_bodies else None,
+        )
     return found
 
 

@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
@@ -43,6 +44,8 @@ class _Rows(NamedTuple):
     recipient: Int[np.ndarray, "R 2 N"]
     heard: Int[np.ndarray, "R 2 N"]
     is_on: Bool[np.ndarray, "R N"]
+    height_m: Float[np.ndarray, "R N"] | None
+    attitude: Float[np.ndarray, "R N 4"] | None
     believed_m: Float[np.ndarray, "R N 2"]
     ego_age: Float[np.ndarray, "R N"]
     known_age: Float[np.ndarray, "R N"]
@@ -53,7 +56,7 @@ class _Rows(NamedTuple):
     velocity_variance_m2ps2: Float[np.ndarray, "R"]
 
 
-def _room(num_windows: int, num_robots: int) -> _Rows:
+def _room(num_windows: int, num_robots: int, *, has_bodies: bool) -> _Rows:
     """Return room for windows; memory that is not written yet is not taken yet."""
     robots = (num_windows, num_robots)
     return _Rows(
@@ -62,6 +65,8 @@ def _room(num_windows: int, num_robots: int) -> _Rows:
         recipient=np.empty((num_windows, 2, num_robots), dtype=np.int64),
         heard=np.empty((num_windows, 2, num_robots), dtype=np.int64),
         is_on=np.empty(robots, dtype=np.bool_),
+        height_m=np.empty(robots) if has_bodies else None,
+        attitude=np.empty((*robots, 4)) if has_bodies else None,
         believed_m=np.empty((*robots, 2)),
         ego_age=np.empty(robots),
         known_age=np.empty(robots),
@@ -107,7 +112,7 @@ class Recorder:
         self._ego = ego
         self._index = index
         self._num_rows = 0  # whole ones
-        self._rows = _room(first_room, num_robots)
+        self._rows = _room(first_room, num_robots, has_bodies=swarm.mission.has_bodies)
         # Half the memory; the picture has 256 shades.
         self._age = np.empty((-(-first_room // self._stride), *matrix), dtype=np.float32)
         self._task_costs: list[TaskCost] = []
@@ -141,7 +146,7 @@ class Recorder:
         num_rows = 2 * len(self._rows.age_mean)
         larger = {}
         for name, array in self._rows._asdict().items():
-            larger[name] = _enlarged(array, num_rows)
+            larger[name] = None if array is None else _enlarged(array, num_rows)
         self._age = _enlarged(self._age, -(-num_rows // self._stride))
         self._rows = _Rows(**larger)
 
@@ -152,10 +157,14 @@ class Recorder:
         rows = self._rows
         states = swarm.states
         buffers = swarm.buffers
-        rows.position_m[row] = states.position_m[index]
-        rows.velocity_mps[row] = states.velocity_mps[index]
+        rows.position_m[row] = states.position_m[index, :, :PLANE]
+        rows.velocity_mps[row] = states.velocity_mps[index, :, :PLANE]
+        if rows.height_m is not None and rows.attitude is not None:
+            assert states.attitude is not None
+            rows.height_m[row] = states.position_m[index, :, PLANE]
+            rows.attitude[row] = states.attitude[index]
         rows.is_on[row] = self._all_on if states.is_active is None else states.is_active[index]
-        rows.believed_m[row] = buffers.position_m[index, self._ego]
+        rows.believed_m[row] = buffers.position_m[index, self._ego, :, :PLANE]
         rows.parent[row] = buffers.parent[index, self._ego]
         if not swarm.phases:  # silence, of a mission that has not begun
             rows.recipient[row] = np.arange(len(self._all_on))
@@ -185,7 +194,7 @@ class Recorder:
     @property
     def window_bytes(self) -> float:
         """The memory that a window takes, but for snapshots of the radio."""
-        row_bytes = sum(array[0].nbytes for array in self._rows)
+        row_bytes = sum(array[0].nbytes for array in self._rows if array is not None)
         return row_bytes + self._age[0].nbytes / self._stride
 
     @property
@@ -222,7 +231,7 @@ class Recorder:
 
     def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
         """Return the windows from a row on, up to another."""
-        flown = _Rows(*(array[first:after] for array in self._rows))
+        flown = _Rows(*(None if each is None else each[first:after] for each in self._rows))
         lead = slice(max(0, first - LEAD_WINDOWS), first)
         compared = self._compared(flown.is_on, first)
         window = np.arange(first + 1, after + 1)
@@ -232,7 +241,11 @@ class Recorder:
         value = np.array([cost.value[self._index] for cost in costs])
         facts = self._facts(config)
         packets = links.fates(
-            flown.recipient, flown.heard, flown.position_m, is_broadcast=facts.is_broadcast
+            flown.recipient,
+            flown.heard,
+            flown.position_m,
+            is_broadcast=facts.is_broadcast,
+            height_m=flown.height_m,
         )
         return Log(
             facts=facts,

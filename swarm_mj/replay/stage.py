@@ -146,13 +146,13 @@ def static_geoms(model: MjModel) -> dict[str, list[rr.AsComponents]]:
         name = model.geom(g).name or f"geom{g}"
         if g in obstacles:
             loss = rr.AnyValues(loss_db=loss_db_of(model, g))
-            found[name] = [_drawn(model, data, g, GLASS), loss]
+            found[name] = [drawn_geom(model, data, g, GLASS), loss]
         else:
-            found[name] = [_drawn(model, data, g, "solid")]
+            found[name] = [drawn_geom(model, data, g, "solid")]
     return found
 
 
-def _drawn(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.AsComponents:
+def drawn_geom(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr.AsComponents:
     """Return a geom in the shape that rerun has for its kind, or else as the box around it."""
     kind = model.geom_type[g]
     size_m = model.geom_size[g]

@@ -15,6 +15,7 @@ import rerun_bindings as bindings
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second
 from swarm_mj.replay import charts, layers, palette, plots
+from swarm_mj.replay.bodies import draw_bodies
 from swarm_mj.replay.layer_kinds import Lines, Lines3D, of_others
 from swarm_mj.replay.layout import draw_legend, layout
 from swarm_mj.replay.links import (
@@ -167,7 +168,9 @@ def draw_team(out: RerunLog) -> None:
     radius_m = RADIUS_SHARE * out.unit_m
     height_m = BODY_HEIGHT * radius_m
     _draw_robots(out)
-    _draw_bodies(out, radius_m, height_m)
+    _draw_discs(out, radius_m, height_m)
+    if log.attitude is not None:
+        draw_bodies(out, radius_m)
     if log.has_motion:
         _draw_motion(out, height_m)
         _draw_trails(out)
@@ -206,14 +209,14 @@ def _draw_robots(out: RerunLog) -> None:
     out.points(layers.EGO_NAME, where_m - (0.0, 3.0 * radius_m), row)
 
 
-def _draw_bodies(out: RerunLog, radius_m: float, height_m: float) -> None:
+def _draw_discs(out: RerunLog, radius_m: float, height_m: float) -> None:
     log = out.log
     entity = layers.SCENE_ROBOTS
     radii = np.full(log.is_on.shape[1], radius_m)
     radii[log.ego] *= OBSERVER
     lengths = np.full(len(radii), height_m)
     out.look(entity, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))
-    where_m = lifted(log.position_m.reshape(-1, 2), height_m / 2.0)
+    where_m = lifted(log.position_m, log.above(height_m / 2.0)).reshape(-1, 3)
     colours = log.colours.reshape(-1, 3)
     out.things(entity, rr.Cylinders3D.columns(centers=where_m, colors=colours))
     # Those who click on one, and videos, read what is known of it.
@@ -229,10 +232,12 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     # All of one length, for agreement is in directions.
     length_m = HEADING_SHARE * out.unit_m * out.scale
     way_m = length_m * log.velocity_mps / np.maximum(speed, 1e-9)
-    start_m = log.position_m.reshape(-1, 2)
-    end_m = (log.position_m + way_m).reshape(-1, 2)
-    out.lines(layers.HEADINGS, start_m, end_m)
-    out.lines(layers.SCENE_HEADINGS, lifted(start_m, height_m), lifted(end_m, height_m))
+    start_m = log.position_m
+    end_m = log.position_m + way_m
+    out.lines(layers.HEADINGS, start_m.reshape(-1, 2), end_m.reshape(-1, 2))
+    above_m = log.above(height_m)
+    raised_m = [lifted(end, above_m).reshape(-1, 3) for end in (start_m, end_m)]
+    out.lines(layers.SCENE_HEADINGS, *raised_m)
 
 
 def _draw_trails(out: RerunLog) -> None:
@@ -321,7 +326,11 @@ def _draw_links(
     at = log.mismatch.window[links["row"]] - log.window[0]
     whole_m = ends(links, log.position_m, at)
     # In 3-D they are whole, whatever their kind: dashes would make the file larger.
-    out.mismatch_lines(in_scene, kind, links, lifted(whole_m, height_m))
+    above_m: float | np.ndarray = height_m
+    if log.height_m is not None:
+        both = np.stack([links["sender"], links["receiver"]], axis=1)
+        above_m = height_m + log.height_m[at[:, None], both]
+    out.mismatch_lines(in_scene, kind, links, lifted(whole_m, above_m))
     pieces = PIECES[kind]
     each = np.repeat(links, len(pieces))
     out.mismatch_lines(on_map, kind, each, divided(whole_m, pieces))

@@ -77,7 +77,7 @@ class Link:
         return heard.reshape(sends.shape)
 
 
-def _checked_places(position_m: ArrayLike, due: tuple[int, ...]) -> Float[np.ndarray, "*B N 2"]:
+def _checked_places(position_m: ArrayLike, due: tuple[int, ...]) -> Float[np.ndarray, "*B N D"]:
     """Return the places as floats of their own; raise ValueError unless they are finite [m]."""
     given = as_array("position_m", position_m)
     if given.dtype.kind not in "fiu":  # NumPy would make numbers of dates, truths and texts, too

@@ -28,7 +28,7 @@ class Localisation:
         self._kept = 0.0  # share of an error that is left a window later
         if mission.position_noise_s > 0.0:
             self._kept = math.exp(-mission.window_s / mission.position_noise_s)
-        self._draws = Stream(rngs, normal, (mission.num_robots, 2))
+        self._draws = Stream(rngs, normal, (mission.num_robots, mission.num_axes))
         self._error_m: np.ndarray | None = None
 
     def observed(self, states: RobotStates) -> RobotStates:

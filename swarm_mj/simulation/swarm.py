@@ -12,6 +12,7 @@ from swarm_mj.control.motion import Controller, controller_of, costed, initial_v
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
 from swarm_mj.mission.placement import draw_survivors
+from swarm_mj.physics.bodies import Bodies
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
@@ -38,6 +39,15 @@ from swarm_mj.system.user_code import is_ours
 MAX_THREADS = 1024
 
 
+def physics_of(
+    mission: Mission, num_missions: int, scene: Scene | None, num_threads: int
+) -> Physics | Bodies:
+    """Return the worlds of a mission's robots, be they points or bodies."""
+    if mission.has_bodies:
+        return Bodies(mission, num_missions, scene=scene, num_threads=num_threads)
+    return Physics(mission, num_missions, scene=scene, num_threads=num_threads)
+
+
 class Swarm:
     """B missions that differ in their seed only: robots, radio and buffers, window by window.
 
@@ -54,7 +64,7 @@ class Swarm:
         num_threads: Threads of MuJoCo, from 1 to 1024.
 
     Attributes:
-        states: Where the robots truly are, [B N 2] each, and who is active.
+        states: Where the robots truly are, [B N D] each, and who is active.
         buffers: What the robots know; entry `[b, i, j]` is what i knows about j.
         views: The same as robots see it: read only, with the clock and the last packets.
         now: t on the synchronised clock, [B], [windows].
@@ -94,7 +104,7 @@ class Swarm:
         self.mission = mission
         self.scene = own.scene
         self._num_missions = len(seeds)
-        self._physics = Physics(mission, len(seeds), scene=own.scene, num_threads=num_threads)
+        self._physics = physics_of(mission, len(seeds), own.scene, num_threads)
 
         # The channel that packets take, and what robots and a centre know of it.
         radio = mission_radio(mission, self._physics.obstacles, own.channel)
@@ -141,9 +151,12 @@ class Swarm:
         """Draw where the robots begin, how fast, who will fail, and errors of localisation."""
         mission = self.mission
         rngs = self._rngs
-        starts = Starts(mission, self._physics.obstacles, self.truth.channel)
+        bodies = self._physics if isinstance(self._physics, Bodies) else None
+        starts = Starts(mission, self._physics.obstacles, self.truth.channel, bodies)
         position_m = [starts.positions(b, rng) for b, rng in enumerate(rngs.placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
+        if bodies is not None:
+            bodies.start_wind(rngs.wind)
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._survivors = draw_survivors(mission, rngs.failures)
         self._noise = None
@@ -159,7 +172,9 @@ class Swarm:
     def _empty_buffers(self) -> None:
         """Let the robots know themselves, and, where that is granted, each other's first states."""
         mission = self.mission
-        self.buffers: Buffers = empty_buffers(self._num_missions, mission.num_robots)
+        self.buffers: Buffers = empty_buffers(
+            self._num_missions, mission.num_robots, mission.num_axes
+        )
         self._give_room(fitting(packet_of(mission), mission, "T, M and P").num_entries)
         self._read_only = self.buffers.read_only()
         states = self._observed(self.states)
@@ -249,7 +264,7 @@ class Swarm:
         The clock and the buffers stay as they are: those are for `step`, which calls this.
 
         Returns:
-            The states afterwards: positions [m] and velocities [m/s], [B N 2] each, who is active,
+            The states afterwards: positions [m] and velocities [m/s], [B N D] each, who is active,
             and, where localisation errs, the positions that robots observe of themselves.
 
         Raises:

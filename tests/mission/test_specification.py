@@ -131,6 +131,9 @@ NOTHING_UNLESS_ASKED = {
     "clock_drift_ppm",
     "map_offset_m",
     "position_noise_m",
+    "height_range_m",
+    "wind_mps",
+    "gust_mps",
     "sensing_miss",
     "sensing_false_alarm",
 }

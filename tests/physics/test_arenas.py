@@ -55,8 +55,10 @@ def test_robots_stay_out_of_obstacles_and_never_stop(arena):
     for _ in range(mission.num_windows):
         swarm.step(policy)
         position_m = swarm.states.position_m.reshape(-1, 2)
-        assert not np.any(blocked(position_m, ROBOT_HEIGHT_M, 1e-3, found))
-        num_touches += np.sum(blocked(position_m, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, found))
+        height_m = np.full(len(position_m), ROBOT_HEIGHT_M)
+        radius_m = np.full(len(position_m), ROBOT_RADIUS_M)
+        assert not np.any(blocked(position_m, height_m, 2e-3 * radius_m, found))
+        num_touches += np.sum(blocked(position_m, height_m, radius_m, found))
     assert num_touches > 0  # somebody was turned round
 
 

@@ -114,5 +114,6 @@ def test_robots_are_blocked_where_their_bodies_touch():
     """The box reaches to x = 10 m; a body of 0.5 m touches it up to 10.5 m."""
     at_x = [0.0, 9.0, 10.4, 10.6, -10.4, -10.6]
     position_m = np.array([[x, 0.0] for x in at_x])
-    touches = blocked(position_m, 1.0, 0.5, boxes((0, 0, 10, 5)))
+    height_m, radius_m = np.full(len(at_x), 1.0), np.full(len(at_x), 0.5)
+    touches = blocked(position_m, height_m, radius_m, boxes((0, 0, 10, 5)))
     assert touches.tolist() == [True, True, True, False, True, False]

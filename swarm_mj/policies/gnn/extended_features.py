@@ -71,7 +71,7 @@ LOCAL_FEATURES = {field: f for field, f in features_of(ExtendedNode).items() if 
 NODE = dtype_of(ExtendedNode)
 LOCAL_NODE = np.dtype([(field, np.float32) for field in LOCAL_FEATURES])
 
-Places = Float[np.ndarray, "B N N 2"]
+Places = Float[np.ndarray, "B N N D"]
 Flags = Bool[np.ndarray, "B N N"]
 Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE` or `LOCAL_NODE`
 OwnNodes = Shaped[np.ndarray, "N"]  # those of one robot's graph
@@ -239,7 +239,7 @@ def _write_team(
     memory: Memory,
     last_attempt: Float[np.ndarray, "N N"],
     is_granted: bool,
-    believed_m: Float[np.ndarray, "N N 2"],
+    believed_m: Float[np.ndarray, "N N D"],
     b: int,
     now: float,
     range_m: float,
@@ -393,7 +393,7 @@ def _find_neighbours(columns: ExtendedColumns, range_m: float) -> None:
 
 @compiled(makes_arrays=False)
 def _find_turns(
-    believed_m: Float[np.ndarray, "N 2"],
+    believed_m: Float[np.ndarray, "N D"],
     beliefs: Beliefs,
     window: int,
     range_m: float,

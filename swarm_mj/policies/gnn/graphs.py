@@ -207,8 +207,8 @@ def _with_state(
 def _write_state(
     timestamp: Float[np.ndarray, "B N N"],
     last_attempt: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    velocity_mps: Float[np.ndarray, "B N N 2"],
+    position_m: Float[np.ndarray, "B N N D"],
+    velocity_mps: Float[np.ndarray, "B N N D"],
     now: Float[np.ndarray, "B"],
     is_relative: bool,
     scale: Scale,
@@ -222,8 +222,10 @@ def _write_state(
             t = x_m = y_m = x_mps = y_mps = 0.0
             if is_relative:
                 t = now[b]
-                x_m, y_m = position_m[b, i, i]
-                x_mps, y_mps = velocity_mps[b, i, i]
+                x_m = position_m[b, i, i, 0]
+                y_m = position_m[b, i, i, 1]
+                x_mps = velocity_mps[b, i, i, 0]
+                y_mps = velocity_mps[b, i, i, 1]
             for k in range(num_robots):
                 of_k: PaperNode | ReferenceNode = node[b, i, k]
                 of_k.timestamp = (timestamp[b, i, k] - t) * scale.per_window

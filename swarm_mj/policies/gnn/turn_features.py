@@ -96,8 +96,8 @@ class OwnBuffer(NamedTuple):
 
     timestamp: Float[np.ndarray, "N"]  # T^k [windows]
     last_attempt: Float[np.ndarray, "N"]  # L^k [windows]
-    position_m: Float[np.ndarray, "N 2"]  # M^k
-    velocity_mps: Float[np.ndarray, "N 2"]  # M^k
+    position_m: Float[np.ndarray, "N D"]  # M^k
+    velocity_mps: Float[np.ndarray, "N D"]  # M^k
     parent: Int[np.ndarray, "N"]  # P^k
     is_granted: bool  # whether it knew all states at t = 0
     spoke: float  # when it last addressed anyone [windows]
@@ -165,8 +165,8 @@ class TurnFeatures(FeatureExtractor):
 def _write_nodes(
     timestamp: Float[np.ndarray, "B N N"],
     last_attempt: Float[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
-    velocity_mps: Float[np.ndarray, "B N N 2"],
+    position_m: Float[np.ndarray, "B N N D"],
+    velocity_mps: Float[np.ndarray, "B N N D"],
     parent: Int[np.ndarray, "B N N"],
     is_granted: Bool[np.ndarray, "B"],
     now: Float[np.ndarray, "B"],

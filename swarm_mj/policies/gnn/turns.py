@@ -32,7 +32,7 @@ def empty_beliefs(num_robots: int) -> Beliefs:
 
 @compiled(makes_arrays=False)
 def take_beliefs(
-    believed_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"], beliefs: Beliefs
+    believed_m: Float[np.ndarray, "N D"], is_known: Bool[np.ndarray, "N"], beliefs: Beliefs
 ) -> bool:
     """Take the beliefs of one robot; return whether they differ from those taken before."""
     num_different = 0  # counted, as the loop then has no branches

@@ -11,6 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int8, Int16
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.policies.index.weights import MOST, Weights
 from swarm_mj.protocol.buffers import ABSENT
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
@@ -124,7 +125,7 @@ def note_and_weigh(
     gain: Gain,
     timestamp: Float[np.ndarray, "B N N"],
     is_known: Bool[np.ndarray, "B N N"],
-    position_m: Float[np.ndarray, "B N N 2"],
+    position_m: Float[np.ndarray, "B N N D"],
     now: Float[np.ndarray, "B"],
     heard: Int[np.ndarray, "B N"],
     has_sent: Bool[np.ndarray, "B N"],
@@ -140,7 +141,7 @@ def note_and_weigh(
         gain: What their packets would bring; written.
         timestamp: T of the robots' buffers, [B N N], [windows].
         is_known: Whether i knows anything of j, [B N N].
-        position_m: The positions of M, [B N N 2], [m].
+        position_m: The positions of M, [B N N D], [m].
         now: t, [B], [windows].
         heard: Whom each robot decoded in the slot, [B N]; itself: nobody.
         has_sent: Who transmitted in it, [B N].
@@ -187,7 +188,7 @@ def _note_decoded(
     i: int,
     sender: int,
     said: Float32[np.ndarray, "N"],
-    position_m: Float[np.ndarray, "N 2"],
+    position_m: Float[np.ndarray, "N D"],
     range_m: float,
     shared: float,
 ) -> None:
@@ -202,6 +203,8 @@ def _note_decoded(
         apart_m = np.hypot(
             position_m[j, 0] - position_m[sender, 0], position_m[j, 1] - position_m[sender, 1]
         )
+        if position_m.shape[1] > PLANE:
+            apart_m = np.hypot(apart_m, position_m[j, 2] - position_m[sender, 2])
         share = chance(apart_m / range_m, shared, SHARED_SCALE)
         if share > LEAST_CHANCE:
             raise_bound(table.bound[b, i, r], said, np.float32(share))
@@ -261,7 +264,7 @@ def _weigh(table: Table, gain: Gain, b: int, i: int, around: Around, weights: We
 
 @compiled(makes_arrays=False)
 def _look_around(
-    position_m: Float[np.ndarray, "N 2"],
+    position_m: Float[np.ndarray, "N D"],
     is_known: Bool[np.ndarray, "N"],
     i: int,
     range_m: float,

@@ -5,6 +5,7 @@ the clock. What a robot hears meanwhile can only keep it silent.
 """
 
 from enum import Enum, auto
+from functools import reduce
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -104,9 +105,9 @@ class Discovery:
         return transmits
 
     def _are_near(
-        self, view: TeamView, i: int, position_m: Float[np.ndarray, "2"], ranges: float
+        self, view: TeamView, i: int, position_m: Float[np.ndarray, "D"], ranges: float
     ) -> Bool[np.ndarray, "N"]:
         """Return the robots that i knows within some ranges of a place."""
         apart_m = view.position_m[i] - position_m
-        is_near = np.hypot(*apart_m.T) < ranges * self._range_m
+        is_near = reduce(np.hypot, apart_m.T) < ranges * self._range_m
         return is_near & view.is_known[i]

@@ -177,7 +177,7 @@ class RestingTeam:
         owner = int(self._current.held[i])
         return None if self._current.table(owner).changes_nothing else owner
 
-    def _flight(self, position_m: Float[np.ndarray, "N 2"], owner: int | None) -> _Flight:
+    def _flight(self, position_m: Float[np.ndarray, "N D"], owner: int | None) -> _Flight:
         """Return the flight from these positions, by someone's table or as was believed."""
         prior = self._belief.links(position_m)
         if owner is None or self._current is None:
@@ -199,7 +199,7 @@ class RestingTeam:
             expected_mw=prior.received_mw * from_db(table.mean_db),
         )
 
-    def _drawn(self, position_m: Float[np.ndarray, "N 2"], slot: int) -> Links:
+    def _drawn(self, position_m: Float[np.ndarray, "N D"], slot: int) -> Links:
         """Return links between places where robots may be, drawn by the slot: the same for all.
 
         A link that never works would else be planned with for ever, as packets over it have the

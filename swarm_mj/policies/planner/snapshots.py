@@ -40,7 +40,7 @@ class Snapshots(Proposals):
 
     is_known: Bool[np.ndarray, "N N"]  # whether i had ever heard of k
     is_fresh: Bool[np.ndarray, "N N"]  # whether that was not too long ago
-    position_m: Float[np.ndarray, "N N 2"]  # of k in the middle of the epoch [m]
+    position_m: Float[np.ndarray, "N N D"]  # of k in the middle of the epoch [m]
     position_std_m: Float[np.ndarray, "N N"]  # its standard deviation, per axis [m]
     timestamp: Float[np.ndarray, "N N"]  # when k observed itself so [windows]
 

@@ -20,7 +20,7 @@ class FirstSlots:
     def __init__(
         self,
         order: Int[np.ndarray, "N"],
-        position_m: Float[np.ndarray, "N N 2"],
+        position_m: Float[np.ndarray, "N N D"],
         is_known: Bool[np.ndarray, "N N"],
         law: PowerLaw,
         rule: Rule,
@@ -69,7 +69,7 @@ class FirstSlots:
 
 
 def believed_powers(
-    position_m: Float[np.ndarray, "N 2"], is_known: Bool[np.ndarray, "N"], law: PowerLaw
+    position_m: Float[np.ndarray, "N D"], is_known: Bool[np.ndarray, "N"], law: PowerLaw
 ) -> Float[np.ndarray, "N N"]:
     """Return powers between robots that one robot knows, as it believes [noise]."""
     return powers_between(position_m, law) * is_known[:, None] * is_known[None, :]

@@ -231,7 +231,7 @@ class SotdmaTeam:
 
 @compiled()
 def _is_in_range(
-    position_m: Float[np.ndarray, "N N 2"], law: PowerLaw, threshold: float
+    position_m: Float[np.ndarray, "N N D"], law: PowerLaw, threshold: float
 ) -> Bool[np.ndarray, "N N"]:
     """Return who decodes each robot's lone packets, as it believes; powers are over the noise."""
     power = np.empty((position_m.shape[0], position_m.shape[0]))

@@ -151,7 +151,8 @@ def _draw_robots(
     way_m = HEADING * picture_m * velocity_mps / np.maximum(speed, 1e-9)
     for i, (where, way) in enumerate(zip(footage.position_m[row], way_m, strict=True)):
         radius_m = (OBSERVER if i == footage.ego else ROBOT) * picture_m
-        height_m = ROBOT_HEIGHT * radius_m
+        up_m = 0.0 if footage.height_m is None else float(footage.height_m[row, i])
+        height_m = up_m + ROBOT_HEIGHT * radius_m
         size_m = np.array([radius_m, radius_m, 0.0])
         colour = theme.ego if i == footage.ego else colours[i]
         if theme.rim is not None:

@@ -3,12 +3,13 @@
 import atexit
 import threading
 import warnings
+from collections.abc import Sequence
 from contextlib import ExitStack
 from weakref import ref
 
 import mujoco._functions as functions  # private: type checkers see it only there
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Float, UInt8
 from mujoco._enums import mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._errors import FatalError
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
@@ -17,8 +18,10 @@ from mujoco._structs import MjData, MjModel, MjrRect, MjvCamera, MjvOption, MjvS
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.obstacles import obstacle_geoms
+from swarm_mj.physics.robots import RobotKind, kinds_of, pose_of
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.links import lifted
 from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.rendering import markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
@@ -61,6 +64,7 @@ class SceneRenderer(ExitStack):
         self._mission = mission
         self._theme = theme
         self._model = pictured(mission, scene, width, height, theme)
+        self._kinds = kinds_of(mission) if mission.has_bodies else []
         self._data = MjData(self._model)
         self._floor = functions.mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
         num_geoms = self._model.ngeom + mission.num_robots * markers.GEOMS_PER_ROBOT
@@ -88,7 +92,7 @@ class SceneRenderer(ExitStack):
         """Return the picture of a window, counted from 0: RGB, its first row on top."""
         width, height = self._size
         data = self._data
-        data.qpos[:] = footage.position_m[row].ravel()
+        data.qpos[:] = _pose(footage, row, self._kinds)
         functions.mj_kinematics(self._model, data)
         functions.mj_comPos(self._model, data)
         functions.mj_camlight(self._model, data)
@@ -114,6 +118,14 @@ def _close(renderer: "ref[SceneRenderer]") -> None:
     # A renderer that is still there when Python ends: later, OpenGL would fail.
     if (left := renderer()) is not None:
         left.close()
+
+
+def _pose(footage: Footage, row: int, kinds: Sequence[RobotKind]) -> Float[np.ndarray, "Q"]:
+    """Return MuJoCo's coordinates of a window's robots."""
+    if footage.height_m is None or footage.attitude is None:
+        return footage.position_m[row].ravel()
+    place_m = lifted(footage.position_m[row], footage.height_m[row])
+    return pose_of(kinds, place_m, footage.attitude[row])
 
 
 def pictured(
@@ -186,6 +198,7 @@ class SceneViewer:
             if not glfw.init():  # MuJoCo's viewer would wait forever
                 raise OSError(NO_WINDOW)
         self._model = pictured(mission, scene, *WINDOW)
+        self._kinds = kinds_of(mission) if mission.has_bodies else []
         self._data = MjData(self._model)
         others = set(threading.enumerate())
         try:
@@ -211,7 +224,7 @@ class SceneViewer:
                 camera.aim(self._window.cam)
                 self._window.opt.geomgroup[BEACONS] = 0
                 self._is_aimed = True
-            self._data.qpos[:] = footage.position_m[0].ravel()
+            self._data.qpos[:] = _pose(footage, 0, self._kinds)
             functions.mj_forward(self._model, self._data)
             self._markers.ngeom = 0
             markers.draw_markers(self._markers, footage, 0, camera)

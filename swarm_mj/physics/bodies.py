@@ -1,0 +1,332 @@
+"""Robots with bodies: B worlds of MuJoCo models, each steered by its pilot, one window a call.
+
+The paper's equation gives no body its velocity, but the set point of its pilot: the acceleration,
+clipped to A_max, moves the set point, clipped to V_max per axis (Eq. 15). At the edge of the area
+the set point is mirrored, so bodies turn there as well as they can. A body that flies and touches
+anything has crashed: its rotors stop, and so does its radio.
+"""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+from mujoco import batch
+
+from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.mission.faults import MIN_SURVIVORS
+from swarm_mj.physics.obstacles import obstacles_of
+from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
+from swarm_mj.physics.robots import (
+    FREE_QPOS,
+    PLANAR_QPOS,
+    MakePilot,
+    RobotKind,
+    kinds_of,
+    make_pilots,
+)
+from swarm_mj.physics.scene import Scene, compiled_scene, compose, num_body_steps
+from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.worlds import check_accelerations
+from swarm_mj.system.compiled import compiled
+
+FREE_QVEL = 6
+LEAST_HEIGHT_M = 0.5  # to which robots that fly can be told to sink
+
+
+class _Flown(NamedTuple):
+    """The robots of a kind, and their part of MuJoCo's arrays; views, which MuJoCo changes."""
+
+    kind: RobotKind
+    pilot: Pilot
+    robots: slice  # their numbers
+    qpos: Float[np.ndarray, "B n Q"]
+    qvel: Float[np.ndarray, "B n V"]
+    ctrl: Float[np.ndarray, "B n U"]
+    push: Float[np.ndarray, "B n V"]  # forces of contacts
+    sensors: Float[np.ndarray, "B n S"]
+
+
+class Bodies:
+    """B MuJoCo worlds of N robots with bodies.
+
+    Attributes:
+        states: Where the robots are [m], [B N 3], how fast [m/s], their attitude, and who is
+            active.
+        obstacles: What stands in the scene; None: nothing.
+        reach_m: How far from its base a robot collides, [N].
+    """
+
+    def __init__(
+        self,
+        mission: Mission,
+        num_missions: int,
+        *,
+        scene: Scene | None = None,
+        pilot: MakePilot | None = None,
+        num_threads: int = 1,
+    ) -> None:
+        """Compile the scene and make B worlds.
+
+        Args:
+            mission: Of all worlds.
+            num_missions: B.
+            scene: A user's, which adds to the arena.
+            pilot: A user's, which makes controls in place of the shipped ones.
+            num_threads: Of MuJoCo's own.
+
+        Raises:
+            ValueError: A robot's model or the scene is refused, or does not compile.
+        """
+        self._mission = mission
+        kinds = kinds_of(mission)
+        self._model = compiled_scene(compose(mission, scene=scene), scene)
+        found = obstacles_of(self._model)
+        self.obstacles = found if len(found.kind) > 0 else None
+        self._batch = batch.Batch(self._model, num_missions, num_threads)
+        self._act = self._batch.bind("act")
+        self._wind = self._batch.expand("opt.wind") if _has_wind(mission) else None
+        self._num_steps = num_body_steps(mission, kinds)
+        pilots = make_pilots(kinds, mission.window_s / self._num_steps, pilot)
+        self._flown = self._divide(kinds, pilots)
+        shape = (num_missions, mission.num_robots)
+        self._wanted_mps = np.zeros((*shape, 3))
+        self._height_m = np.zeros(shape)
+        self._has_crashed = np.zeros(shape, dtype=np.bool_)
+        self.reach_m = np.concatenate([np.full(kind.num_robots, kind.reach_m) for kind in kinds])
+        self._works: np.ndarray | None = None  # who was not made to fail
+        self.states = RobotStates(
+            position_m=np.zeros((*shape, 3)),
+            velocity_mps=np.zeros((*shape, 3)),
+            attitude=np.zeros((*shape, 4)),
+        )
+
+    def _divide(self, kinds: Sequence[RobotKind], pilots: Sequence[Pilot]) -> list[_Flown]:
+        """Return each kind's part of the arrays, whose robots follow each other."""
+        arrays = [self._batch.bind(name) for name in ("qpos", "qvel", "ctrl")]
+        arrays += [self._batch.bind("qfrc_constraint"), self._batch.bind("sensordata")]
+        starts = [0] * len(arrays)
+        found = []
+        for kind, pilot in zip(kinds, pilots, strict=True):
+            model = kind.model
+            widths = (model.nq, model.nv, model.nu, model.nv, model.nsensordata)
+            parts = []
+            for a, (array, width) in enumerate(zip(arrays, widths, strict=True)):
+                after = starts[a] + kind.num_robots * width
+                part = array[:, starts[a] : after]
+                parts.append(part.reshape(len(array), kind.num_robots, width))
+                starts[a] = after
+            robots = slice(kind.first, kind.first + kind.num_robots)
+            found.append(_Flown(kind, pilot, robots, *parts))
+        return found
+
+    def draw_heights_m(self, rng: np.random.Generator) -> Float[np.ndarray, "N"]:
+        """Return where robots begin: those that fly in the mission's range, others on the floor."""
+        mission = self._mission
+        height_m = np.full(mission.num_robots, mission.height_m)
+        if mission.height_range_m > 0.0:
+            height_m += rng.uniform(0.0, mission.height_range_m, mission.num_robots)
+        for flown in self._flown:
+            if not flown.kind.is_free:
+                height_m[flown.robots] = flown.kind.base_m
+        return height_m
+
+    def start_wind(self, rngs: Sequence[np.random.Generator]) -> None:
+        """Begin the gusts of each mission, from its own generator."""
+        self._gusts = Stream(rngs, normal, (2,)) if self._mission.gust_mps > 0.0 else None
+        self._gust_mps = np.zeros((len(rngs), 2))
+        if self._gusts is not None:
+            self._gust_mps = self._mission.gust_mps * self._gusts.next()
+        self._blow()
+
+    def _blow(self) -> None:
+        """Set the wind of the next window: its mean to the east, and the gust of each mission."""
+        if self._wind is not None:
+            self._wind[:, 0] = self._mission.wind_mps + self._gust_mps[:, 0]
+            self._wind[:, 1] = self._gust_mps[:, 1]
+
+    def _change_gusts(self) -> None:
+        """Let gusts change by a window: a first-order Gauss-Markov process of constant variance."""
+        if self._gusts is not None:
+            kept = np.exp(-self._mission.window_s / self._mission.gust_s)
+            fresh_mps = self._mission.gust_mps * self._gusts.next()
+            self._gust_mps = kept * self._gust_mps + np.sqrt(1.0 - kept**2) * fresh_mps
+        self._blow()
+
+    def place(
+        self, position_m: Float[np.ndarray, "B N 3"], velocity_mps: Float[np.ndarray, "B N 3"]
+    ) -> None:
+        """Restart all worlds from p_0 [m] and v_0 [m/s], level, with rotors at their set points."""
+        self._batch.reset()
+        self._wanted_mps[:] = velocity_mps
+        self._height_m[:] = position_m[..., 2]
+        self._has_crashed[:] = False
+        self._works = None
+        for flown in self._flown:
+            its_m = position_m[:, flown.robots]
+            its_mps = velocity_mps[:, flown.robots]
+            if flown.kind.is_free:
+                flown.qpos[..., :3] = its_m
+                flown.qpos[..., 3] = 1.0
+                flown.qpos[..., 4:FREE_QPOS] = 0.0
+                flown.qvel[..., :3] = its_mps
+            else:
+                flown.qpos[..., :2] = its_m[..., :2]
+                flown.qpos[..., 2] = np.arctan2(its_mps[..., 1], its_mps[..., 0])
+                flown.qvel[..., :2] = its_mps[..., :2]
+        self._steer()
+        self._start_actuators()
+        self._batch.forward()
+        self._take_states()
+
+    def _start_actuators(self) -> None:
+        """Let what follows its control by a lag begin where the control is: rotors turn already."""
+        model = self._model
+        control = self._batch.bind("ctrl")
+        for u in np.flatnonzero(model.actuator_actnum == 1).tolist():
+            self._act[:, model.actuator_actadr[u]] = control[:, u]
+
+    def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
+        """Make these the robots that work from now on; the others keep moving."""
+        self._works = is_active
+        self._count_active()
+
+    def _count_active(self) -> None:
+        """Take robots that crashed for failed, as long as some are left in each mission."""
+        if self._works is None and not np.any(self._has_crashed):
+            return
+        is_active = ~self._has_crashed if self._works is None else self._works & ~self._has_crashed
+        is_empty = np.sum(is_active, axis=1) < MIN_SURVIVORS
+        before = self.states.is_active
+        if before is None:
+            before = np.ones_like(is_active) if self._works is None else self._works
+        is_active = np.where(is_empty[:, None], before, is_active)
+        self.states = replace(self.states, is_active=is_active)
+
+    def step(self, acceleration_mps2: Float[np.ndarray, "B N 3"]) -> RobotStates:
+        """Move all robots one window on; ValueError for a wrong u or a model that is unstable."""
+        check_accelerations(acceleration_mps2, self.states.position_m.shape)
+        mission = self._mission
+        _move_set_points(
+            acceleration=acceleration_mps2,
+            position=self.states.position_m,
+            dt_s=mission.window_s,
+            limit_mps2=mission.max_acceleration_mps2,
+            limit_mps=mission.max_velocity_mps,
+            wall_m=mission.half_side_m if mission.has_walls else np.inf,
+            wanted_mps=self._wanted_mps,
+            height_m=self._height_m,
+        )
+        for _ in range(self._num_steps):
+            self._steer()
+            self._batch.step()
+            for flown in self._flown:
+                if flown.kind.is_free:
+                    _note_contacts(flown.push, self._has_crashed[:, flown.robots])
+        self._change_gusts()
+        self._take_states()
+        self._count_active()
+        return self.states
+
+    def _steer(self) -> None:
+        """Let the pilots write all controls; those of robots that crashed are 0."""
+        for flown in self._flown:
+            robots = flown.robots
+            wanted = SetPoint(self._wanted_mps[:, robots], self._height_m[:, robots])
+            flown.pilot(_sensed(flown), wanted, flown.ctrl)
+            _stop(self._has_crashed[:, robots], flown.ctrl)
+
+    def _take_states(self) -> None:
+        """Copy where robots are, in arrays that later steps do not change."""
+        states = self.states
+        position_m = np.empty_like(states.position_m)
+        velocity_mps = np.empty_like(position_m)
+        attitude = np.empty((*position_m.shape[:2], 4))
+        for flown in self._flown:
+            sensed = _sensed(flown)
+            position_m[:, flown.robots] = sensed.position_m
+            velocity_mps[:, flown.robots] = sensed.velocity_mps
+            attitude[:, flown.robots] = sensed.attitude
+        if not np.all(np.isfinite(position_m)):
+            b, i, _ = np.argwhere(~np.isfinite(position_m))[0]
+            raise ValueError(
+                f"robot {i} of mission {b} is nowhere: its model is not stable under its pilot; "
+                "choose lower gains, or a shorter timestep in its file"
+            )
+        self.states = replace(
+            states, position_m=position_m, velocity_mps=velocity_mps, attitude=attitude
+        )
+
+
+def _has_wind(mission: Mission) -> bool:
+    return mission.wind_mps > 0.0 or mission.gust_mps > 0.0
+
+
+def _sensed(flown: _Flown) -> Sensed:
+    """Return the states of a kind's robots."""
+    qpos = flown.qpos
+    qvel = flown.qvel
+    if flown.kind.is_free:
+        return Sensed(
+            position_m=qpos[..., :3],
+            attitude=qpos[..., 3:FREE_QPOS],
+            velocity_mps=qvel[..., :3],
+            turn_rate_rps=qvel[..., 3:FREE_QVEL],
+            sensors=flown.sensors,
+        )
+    shape = qpos.shape[:2]
+    position_m = np.empty((*shape, 3))
+    velocity_mps = np.zeros((*shape, 3))
+    attitude = np.zeros((*shape, 4))
+    turn_rate_rps = np.zeros((*shape, 3))
+    position_m[..., :2] = qpos[..., :2]
+    position_m[..., 2] = flown.kind.base_m
+    velocity_mps[..., :2] = qvel[..., :2]
+    half = 0.5 * qpos[..., 2]
+    attitude[..., 0] = np.cos(half)
+    attitude[..., 3] = np.sin(half)
+    turn_rate_rps[..., 2] = qvel[..., PLANAR_QPOS - 1]
+    return Sensed(position_m, attitude, velocity_mps, turn_rate_rps, flown.sensors)
+
+
+@compiled(makes_arrays=False)
+def _move_set_points(
+    acceleration: Float[np.ndarray, "B N 3"],
+    position: Float[np.ndarray, "B N 3"],
+    dt_s: float,
+    limit_mps2: float,
+    limit_mps: float,
+    wall_m: float,
+    wanted_mps: Float[np.ndarray, "B N 3"],
+    height_m: Float[np.ndarray, "B N"],
+) -> None:
+    """Accelerate, clip, and turn round at the edge (Eq. 15); heights follow what climbs."""
+    for b in range(acceleration.shape[0]):
+        for i in range(acceleration.shape[1]):
+            for axis in range(3):
+                u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
+                v = min(max(wanted_mps[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
+                p = position[b, i, axis]
+                if axis < 2 and abs(p) > wall_m and p * v > 0.0:
+                    v = -v
+                wanted_mps[b, i, axis] = v
+            height_m[b, i] = max(height_m[b, i] + wanted_mps[b, i, 2] * dt_s, LEAST_HEIGHT_M)
+
+
+@compiled(makes_arrays=False)
+def _note_contacts(push: Float[np.ndarray, "B n V"], has_crashed: Bool[np.ndarray, "B n"]) -> None:
+    """Note whom contacts push at all: MuJoCo's constraints act on nothing else here."""
+    for b in range(push.shape[0]):
+        for i in range(push.shape[1]):
+            if push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0 or push[b, i, 2] != 0.0:
+                has_crashed[b, i] = True
+
+
+@compiled(makes_arrays=False)
+def _stop(has_crashed: Bool[np.ndarray, "B n"], control: Float[np.ndarray, "B n U"]) -> None:
+    for b in range(control.shape[0]):
+        for i in range(control.shape[1]):
+            if has_crashed[b, i]:
+                control[b, i] = 0.0

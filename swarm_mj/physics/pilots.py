@@ -1,0 +1,271 @@
+"""Pilots: what makes a robot's controls of its state and of the velocity that it is to have.
+
+A pilot steers all robots of one kind at once, in every step of MuJoCo's. It is chosen with the
+robot's model (`physics.robots`), and one of a user's own is any class of this form:
+
+    class Pilot:
+        def __init__(self, airframe):
+            self.airframe = airframe
+
+        def __call__(self, sensed, wanted, control):
+            control[:] = 0.25 * 9.81 * self.airframe.mass_kg
+
+Index order: `[b, i]` is robot `i` of its kind, in mission `b`. Vectors are the world's, unless a
+name says otherwise; quaternions are MuJoCo's, the real part first.
+"""
+
+import math
+from dataclasses import dataclass
+from typing import NamedTuple, Protocol, runtime_checkable
+
+import numpy as np
+from jaxtyping import Float
+
+from swarm_mj.system.compiled import compiled
+
+GRAVITY_MPS2 = 9.81
+
+
+@dataclass(frozen=True, kw_only=True)
+class Airframe:
+    """What a pilot is told of a robot's model, once."""
+
+    mass_kg: float  # of the whole robot
+    inertia_kgm2: Float[np.ndarray, "3"]  # of its base, about the axes of its frame
+    actuators: tuple[str, ...]  # the U controls' names
+    least: Float[np.ndarray, "U"]  # of each control; -inf without a limit
+    most: Float[np.ndarray, "U"]  # of each control; inf without a limit
+    sensors: tuple[str, ...]  # the names of the model's sensors, in the order of their numbers
+    step_s: float  # MuJoCo's step
+
+
+class Sensed(NamedTuple):
+    """The states of all robots of a kind, in B missions, as they are."""
+
+    position_m: Float[np.ndarray, "B n 3"]
+    attitude: Float[np.ndarray, "B n 4"]  # from the robot's frame to the world's
+    velocity_mps: Float[np.ndarray, "B n 3"]
+    turn_rate_rps: Float[np.ndarray, "B n 3"]  # about the axes of the robot's own frame [rad/s]
+    sensors: Float[np.ndarray, "B n S"]  # the numbers of the model's sensors, before this step
+
+
+class SetPoint(NamedTuple):
+    """What all robots of a kind are to do, in B missions."""
+
+    velocity_mps: Float[np.ndarray, "B n 3"]
+    height_m: Float[np.ndarray, "B n"]  # of robots that fly
+
+
+@runtime_checkable
+class Pilot(Protocol):
+    """Steers all robots of a kind."""
+
+    def __call__(
+        self, sensed: Sensed, wanted: SetPoint, control: Float[np.ndarray, "B n U"], /
+    ) -> None:
+        """Write the controls of the next step, in the model's order and units; MuJoCo clips them.
+
+        Args:
+            sensed: Where robots are, and how fast.
+            wanted: The velocities and heights that they are to have.
+            control: Their controls, [B, n, U]; written.
+        """
+        ...
+
+
+class QuadrotorPilot:
+    """Tracks a velocity and a height by tilting: Lee, Leok and McClamroch 2010, for velocities.
+
+    The force that is wanted is proportional to the errors of velocity and height; the body's third
+    axis follows its direction, and the four rotors share force and torque. A pole of about 10
+    rad/s turns the body, one of 2 to 3 rad/s the velocity: slower than the rotors' lag, and faster
+    than news.
+
+    The four actuators must be rotors in the order front, left, back and right of a cross, front and
+    back turning one way.
+    """
+
+    ARM_M = 0.175  # assets/quadrotor.xml, as the next one
+    TORQUE_PER_LIFT_M = 0.02455
+    MOST_TILT = math.tan(math.radians(40.0))  # of the horizontal over the vertical force
+    LEAST_LIFT = 0.3  # of gravity: a body that falls freely has no force to turn
+
+    def __init__(self, airframe: Airframe) -> None:
+        """Prepare for this airframe; raise ValueError for one without four rotors."""
+        if len(airframe.actuators) != 4:
+            raise ValueError(f"its pilot needs four rotors, not {len(airframe.actuators)}")
+        self._mass_kg = airframe.mass_kg
+        self._inertia_kgm2 = airframe.inertia_kgm2
+        self._least = float(airframe.least[0])
+        self._most = float(airframe.most[0])
+
+    def __call__(
+        self, sensed: Sensed, wanted: SetPoint, control: Float[np.ndarray, "B n U"], /
+    ) -> None:
+        """Write the rotors' lifts [N]."""
+        _steer_quadrotors(
+            position_m=sensed.position_m,
+            attitude=sensed.attitude,
+            velocity_mps=sensed.velocity_mps,
+            turn_rate_rps=sensed.turn_rate_rps,
+            wanted_mps=wanted.velocity_mps,
+            height_m=wanted.height_m,
+            mass_kg=self._mass_kg,
+            inertia_kgm2=self._inertia_kgm2,
+            arm_m=self.ARM_M,
+            torque_per_lift_m=self.TORQUE_PER_LIFT_M,
+            most_tilt=self.MOST_TILT,
+            least_lift=self.LEAST_LIFT,
+            least_n=self._least,
+            most_n=self._most,
+            control=control,
+        )
+
+
+class RoverPilot:
+    """Drives and turns a robot with two driven sides, which cannot move sideways.
+
+    It turns towards the velocity that is wanted, or away from it and drives backwards if that is
+    nearer, and drives as fast as its heading allows.
+    """
+
+    MOST_MPS = 2.0  # assets/rover.xml, as the next one
+    MOST_RPS = 4.0
+
+    def __init__(self, airframe: Airframe) -> None:
+        """Prepare for this airframe, whose first two actuators must be force and torque."""
+        if airframe.actuators[:2] != ("drive", "steer"):
+            raise ValueError(
+                "its pilot needs the actuators drive and steer, not "
+                f"{', '.join(airframe.actuators) or 'none'}"
+            )
+        self._mass_kg = airframe.mass_kg
+        self._inertia_kgm2 = float(airframe.inertia_kgm2[2])
+
+    def __call__(
+        self, sensed: Sensed, wanted: SetPoint, control: Float[np.ndarray, "B n U"], /
+    ) -> None:
+        """Write the force along the robot [N] and the torque about its vertical [Nm]."""
+        _steer_rovers(
+            attitude=sensed.attitude,
+            velocity_mps=sensed.velocity_mps,
+            turn_rate_rps=sensed.turn_rate_rps,
+            wanted_mps=wanted.velocity_mps,
+            mass_kg=self._mass_kg,
+            inertia_kgm2=self._inertia_kgm2,
+            most_mps=self.MOST_MPS,
+            most_rps=self.MOST_RPS,
+            control=control,
+        )
+
+
+# Of the quadrotor, each per second or its square: of velocity, height, climb, tilt and so on.
+_VELOCITY_GAIN = 2.5
+_HEIGHT_GAIN = 4.0
+_CLIMB_GAIN = 4.0
+_TILT_GAIN = 80.0
+_TURN_GAIN = 14.0
+_YAW_GAIN = 4.0
+_YAW_RATE_GAIN = 4.0
+
+
+@compiled(makes_arrays=False)
+def _steer_quadrotors(
+    position_m: Float[np.ndarray, "B n 3"],
+    attitude: Float[np.ndarray, "B n 4"],
+    velocity_mps: Float[np.ndarray, "B n 3"],
+    turn_rate_rps: Float[np.ndarray, "B n 3"],
+    wanted_mps: Float[np.ndarray, "B n 3"],
+    height_m: Float[np.ndarray, "B n"],
+    mass_kg: float,
+    inertia_kgm2: Float[np.ndarray, "3"],
+    arm_m: float,
+    torque_per_lift_m: float,
+    most_tilt: float,
+    least_lift: float,
+    least_n: float,
+    most_n: float,
+    control: Float[np.ndarray, "B n U"],
+) -> None:
+    for b in range(control.shape[0]):
+        for i in range(control.shape[1]):
+            # The acceleration that is wanted, gravity made up for.
+            x = _VELOCITY_GAIN * (wanted_mps[b, i, 0] - velocity_mps[b, i, 0])
+            y = _VELOCITY_GAIN * (wanted_mps[b, i, 1] - velocity_mps[b, i, 1])
+            climb = _HEIGHT_GAIN * (height_m[b, i] - position_m[b, i, 2])
+            climb += _CLIMB_GAIN * (wanted_mps[b, i, 2] - velocity_mps[b, i, 2])
+            z = max(GRAVITY_MPS2 + climb, least_lift * GRAVITY_MPS2)
+            flat = math.sqrt(x * x + y * y)
+            if flat > most_tilt * z:
+                x *= most_tilt * z / flat
+                y *= most_tilt * z / flat
+            size = math.sqrt(x * x + y * y + z * z)
+            # The rotation's columns are the body's axes in the world's frame.
+            w, a, e, c = attitude[b, i]
+            up_x = 2.0 * (a * c + w * e)
+            up_y = 2.0 * (e * c - w * a)
+            up_z = 1.0 - 2.0 * (a * a + e * e)
+            front_x = 1.0 - 2.0 * (e * e + c * c)
+            front_y = 2.0 * (a * e + w * c)
+            front_z = 2.0 * (a * c - w * e)
+            left_x = 2.0 * (a * e - w * c)
+            left_y = 1.0 - 2.0 * (a * a + c * c)
+            left_z = 2.0 * (e * c + w * a)
+            # How far the body's axis is from the force, as a turn, about the body's own axes.
+            turn_x = (up_y * z - up_z * y) / size
+            turn_y = (up_z * x - up_x * z) / size
+            turn_z = (up_x * y - up_y * x) / size
+            roll = turn_x * front_x + turn_y * front_y + turn_z * front_z
+            pitch = turn_x * left_x + turn_y * left_y + turn_z * left_z
+            yaw = math.atan2(front_y, front_x)
+            lift_n = mass_kg * max(x * up_x + y * up_y + z * up_z, 0.0)
+            rates = turn_rate_rps[b, i]
+            roll_nm = inertia_kgm2[0] * (_TILT_GAIN * roll - _TURN_GAIN * rates[0])
+            pitch_nm = inertia_kgm2[1] * (_TILT_GAIN * pitch - _TURN_GAIN * rates[1])
+            yaw_nm = -inertia_kgm2[2] * (_YAW_GAIN * yaw + _YAW_RATE_GAIN * rates[2])
+            each_n = 0.25 * lift_n
+            rolling_n = 0.5 * roll_nm / arm_m  # left lifts, right lowers
+            pitching_n = 0.5 * pitch_nm / arm_m  # back lifts, front lowers
+            yawing_n = 0.25 * yaw_nm / torque_per_lift_m  # left and right turn the body to the left
+            control[b, i, 0] = min(max(each_n - pitching_n - yawing_n, least_n), most_n)
+            control[b, i, 1] = min(max(each_n + rolling_n + yawing_n, least_n), most_n)
+            control[b, i, 2] = min(max(each_n + pitching_n - yawing_n, least_n), most_n)
+            control[b, i, 3] = min(max(each_n - rolling_n + yawing_n, least_n), most_n)
+
+
+# Of the rover, per second.
+_DRIVE_GAIN = 5.0
+_HEADING_GAIN = 3.0
+_STEER_GAIN = 10.0
+_STANDS_MPS = 0.01  # slower than this, no heading is better than another
+
+
+@compiled(makes_arrays=False)
+def _steer_rovers(
+    attitude: Float[np.ndarray, "B n 4"],
+    velocity_mps: Float[np.ndarray, "B n 3"],
+    turn_rate_rps: Float[np.ndarray, "B n 3"],
+    wanted_mps: Float[np.ndarray, "B n 3"],
+    mass_kg: float,
+    inertia_kgm2: float,
+    most_mps: float,
+    most_rps: float,
+    control: Float[np.ndarray, "B n U"],
+) -> None:
+    for b in range(control.shape[0]):
+        for i in range(control.shape[1]):
+            w, a, e, c = attitude[b, i]
+            front_x = 1.0 - 2.0 * (e * e + c * c)
+            front_y = 2.0 * (a * e + w * c)
+            along = wanted_mps[b, i, 0] * front_x + wanted_mps[b, i, 1] * front_y
+            across = wanted_mps[b, i, 1] * front_x - wanted_mps[b, i, 0] * front_y
+            turn_rps = 0.0
+            if along * along + across * across > _STANDS_MPS * _STANDS_MPS:
+                ahead = 1.0 if along >= 0.0 else -1.0
+                turn_rps = _HEADING_GAIN * math.atan2(ahead * across, ahead * along)
+            turn_rps = min(max(turn_rps, -most_rps), most_rps)
+            speed_mps = min(max(along, -most_mps), most_mps)
+            own_mps = velocity_mps[b, i, 0] * front_x + velocity_mps[b, i, 1] * front_y
+            control[b, i, 0] = mass_kg * _DRIVE_GAIN * (speed_mps - own_mps)
+            turning = turn_rps - turn_rate_rps[b, i, 2]
+            control[b, i, 1] = inertia_kgm2 * _STEER_GAIN * turning
