@@ -111,7 +111,10 @@ def imports(path):
         ),
         ("physics/state", set()),
         ("protocol/timestamps", {"system.compiled"}),
-        ("protocol/buffers", {"system.compiled", "physics.state", "protocol.timestamps"}),
+        (
+            "protocol/buffers",
+            {"system.compiled", "mission.geometry", "physics.state", "protocol.timestamps"},
+        ),
     ],
 )
 def test_the_innermost_rooms_know_no_others(name, known):

@@ -34,6 +34,7 @@ def check_convergence(
     channel: str | None = None,
     controller: str | None = None,
     scene: str | None = None,
+    pilot: str | None = None,
     features: str | Sequence[str] = (),
     networks: str | Sequence[str] = (),
     num_jobs: int = 1,
@@ -61,6 +62,7 @@ def check_convergence(
         channel: Who decodes whom, by `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that edits the MuJoCo model, likewise; none unless given.
+        pilot: What makes the controls of robots with bodies, likewise; the robot's unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
         networks: Names of your own networks that it decides by.
         num_jobs: Processes, as in `evaluate`.
@@ -85,7 +87,7 @@ def check_convergence(
     """
     need("scipy", "a check")
     mission = mission_of(check_convergence, task, mission_fields)
-    components = {"channel": channel, "controller": controller, "scene": scene}
+    components = {"channel": channel, "controller": controller, "scene": scene, "pilot": pilot}
     for kind, name in components.items():
         check_named("check_convergence", kind, name)
     check_named("check_convergence", "policy", policy)

@@ -154,6 +154,7 @@ def evaluate(
     channel: str | None = None,
     controller: str | None = None,
     scene: str | None = None,
+    pilot: str | None = None,
     features: str | Sequence[str] = (),
     networks: str | Sequence[str] = (),
     num_jobs: int = 1,
@@ -179,6 +180,7 @@ def evaluate(
         channel: Who decodes whom, by `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that edits the MuJoCo model, likewise; none unless given.
+        pilot: What makes the controls of robots with bodies, likewise; the robot's unless given.
         features: Names of your own feature extractors that learned policies were trained with.
         networks: Names of your own networks that they decide by.
         num_jobs: Processes. With more than one, a script must guard what it runs by
@@ -209,7 +211,7 @@ def evaluate(
     """
     need("scipy", "an evaluation")
     mission = mission_of(evaluate, task, mission_fields)
-    components = {"channel": channel, "controller": controller, "scene": scene}
+    components = {"channel": channel, "controller": controller, "scene": scene, "pilot": pilot}
     for kind, name in components.items():
         check_named("evaluate", kind, name)
     check_value(EngineOptions.__dataclass_fields__["jobs"], num_jobs, "num_jobs")

@@ -19,8 +19,10 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_numbers
 from swarm_mj.api.run import Run
 from swarm_mj.mission import Mission
+from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.geometry import count_strayed
 from swarm_mj.physics.arenas import ARENAS
+from swarm_mj.physics.robots import SHIPPED
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
@@ -280,7 +282,14 @@ def compile_ahead(mission: Mission, policy_name: str, arguments: PolicyArguments
     # A stored policy may be for teams of one size, and a file's arena does not shrink.
     is_bound = registry.is_stored(policy_name) or mission.arena not in ARENAS
     robots = mission.num_robots if is_bound else 3
-    smallest = replace(mission, num_robots=robots, range_ratio=10.0, num_windows=COMPILING_WINDOWS)
+    kind = mission.groups[0].kind
+    smallest = replace(
+        mission,
+        num_robots=robots,
+        robot=kind if kind in SHIPPED else POINT,  # a file may need a pilot of its own
+        range_ratio=10.0,
+        num_windows=COMPILING_WINDOWS,
+    )
     if policy_name in registry.POLICIES or registry.is_stored(policy_name):
         policy = registry.make_policy_with(arguments, policy_name, smallest)
     else:

@@ -13,6 +13,7 @@ from swarm_mj.api.live import LiveFlight, viewer_to_keep
 from swarm_mj.api.run import Run
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, PresetAndFields, make_mission
+from swarm_mj.physics.pilots import Pilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
@@ -39,6 +40,7 @@ def fly(
     channel: str | Channel | None = None,
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
+    pilot: str | Pilot | None = None,
     features: str | Sequence[str] = (),
     networks: str | Sequence[str] = (),
     **mission_fields: Unpack[PresetAndFields],
@@ -65,6 +67,7 @@ def fly(
         channel: Who decodes whom, as an object or `module:Name`; the mission's radio unless given.
         controller: What drives the robots, likewise; that of the task unless given.
         scene: A function that edits the MuJoCo model, likewise; none unless given.
+        pilot: What makes the controls of robots with bodies, likewise; the robot's unless given.
         features: Names of your own feature extractors that a learned policy was trained with.
         networks: Names of your own networks that it decides by.
         **mission_fields: Any field of `Mission`, in its unit, such as `num_robots=20` or
@@ -108,7 +111,7 @@ def fly(
         policy=made,
         policy_name=name,
         arguments=arguments,
-        components=Components(channel=channel, controller=controller, scene=scene),
+        components=Components(channel=channel, controller=controller, scene=scene, pilot=pilot),
         seed=seed,
         observer=observer,
         is_recorded=record,

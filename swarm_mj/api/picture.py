@@ -28,6 +28,7 @@ from swarm_mj.physics import outlines, scene, state
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Footage, frame
+from swarm_mj.replay.links import on_map
 
 DPI = 150  # so that the picture has 1920 by 1080 pixels
 # The map's side, and where it stands.
@@ -188,14 +189,14 @@ def _draw_packets(axes: Axes, footage: Footage, row: int, radius_m: float) -> li
     """Draw an arrow for each packet that was on the way, a lost one half-way; return samples."""
     shown = []
     for fate, packets in footage.packets_at(row).items():
-        way_m = palette.PACKETS[fate].share * (packets.end_m - packets.start_m)
+        way_m = palette.PACKETS[fate].share * on_map(packets.end_m - packets.start_m)
         span_m = np.linalg.norm(way_m, axis=1)
         far = span_m > 2.0 * radius_m
         if not np.any(far):
             continue
         # From rim to rim, so that no robot hides an arrow's head.
         rim_m = radius_m * way_m[far] / span_m[far, None]
-        start_m = packets.start_m[far] + rim_m
+        start_m = on_map(packets.start_m[far]) + rim_m
         along_m = way_m[far] - 2.0 * rim_m
         colour = rgb(palette.PACKETS[fate].colour)
         axes.quiver(

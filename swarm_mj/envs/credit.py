@@ -115,7 +115,7 @@ def replay_otherwise(
 
     Args:
         timestamp: T at the end of the window before [windows], [B, N, N].
-        position_m: Where the robots are, [B, N, 2].
+        position_m: Where the robots are, [B, N, D].
         recipient: Whom each robot addresses, [B, N]; itself is silence.
         channel: A `snapshot_channel` from before the window.
         now: The start of the window [windows], [B].

@@ -18,6 +18,7 @@ from jaxtyping import Int
 
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
+from swarm_mj.physics.pilots import Pilot
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.checks import as_array, checked_robots
 from swarm_mj.radio.free_space import Channel
@@ -33,6 +34,7 @@ def make_environment(
     channel: Channel | None = None,
     controller: Controller | None = None,
     scene: Scene | None = None,
+    pilot: Pilot | None = None,
 ) -> control.Environment:
     """Return one mission as an environment of dm_control, and so of dm_env.
 
@@ -45,6 +47,7 @@ def make_environment(
         controller: As of `Swarm`: what drives the robots; None is the task's own.
         scene: As of `Swarm`: a function that edits the MuJoCo model; None leaves the mission's
             arena as it is.
+        pilot: As of `Swarm`: what makes the controls of bodies; None is the robot's own.
 
     Returns:
         The environment. An action is the recipient of each robot, [N] integers from 0 to N - 1,
@@ -59,7 +62,7 @@ def make_environment(
     Example:
         >>> time_step = make_environment(paper("flocking"), seed=1).reset()
     """
-    swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene)
+    swarm = Swarm(mission, [seed], channel=channel, controller=controller, scene=scene, pilot=pilot)
     return control.Environment(SwarmPhysics(swarm, seed), SwarmTask(seed))
 
 
@@ -108,8 +111,9 @@ class SwarmPhysics(mujoco.Physics):
         mission = self.swarm.mission
         states = self.swarm.states
         self.data.time = self.swarm.now[0] * mission.window_s
-        self.data.qpos[:] = states.position_m.ravel()
-        self.data.qvel[:] = states.velocity_mps.ravel()
+        qpos, qvel = self.swarm.pose
+        self.data.qpos[:] = qpos[0]
+        self.data.qvel[:] = qvel[0]
         self.data.ctrl[:] = states.velocity_mps.ravel() if mission.physics == "exact" else 0.0
         self.forward()
 

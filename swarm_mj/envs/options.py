@@ -13,7 +13,9 @@ from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs import environment_id
 from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission, Task, TaskAndFields, make_mission
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.arenas import arena_of
+from swarm_mj.physics.pilots import Pilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
 from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
@@ -34,9 +36,9 @@ class RobotTruth(NamedTuple):
     age: Float[np.ndarray, "B N N"]  # of what it knows of each robot: 0 is now; 1: never known
 
 
-def num_truths(num_robots: int) -> int:
+def num_truths(num_robots: int, num_axes: int = PLANE) -> int:
     """Return how many numbers `truth` has: the share that is flown, then those of `RobotTruth`."""
-    position = velocity = 2
+    position = velocity = num_axes
     is_active = 1
     return 1 + num_robots * (position + velocity + is_active + num_robots)
 
@@ -54,6 +56,7 @@ class BatchOptions(TaskAndFields, total=False):
     channel: Channel | str | None
     controller: Controller | str | None
     scene: Scene | str | None
+    pilot: Pilot | str | None
 
 
 def make_batch(
@@ -67,6 +70,7 @@ def make_batch(
     channel: Channel | str | None = None,
     controller: Controller | str | None = None,
     scene: Scene | str | None = None,
+    pilot: Pilot | str | None = None,
     **fields: Unpack[TaskAndFields],
 ) -> MissionBatch:
     """Return missions that have not begun, by the options that all environments share.
@@ -88,6 +92,7 @@ def make_batch(
         channel: As of `Swarm`, or its name, `module:Name`; a copy of it is used.
         controller: Likewise.
         scene: Likewise.
+        pilot: Likewise.
         **fields: Any other field of `Mission`.
     """
     if not isinstance(num_missions, Integral) or num_missions < 1:
@@ -100,7 +105,7 @@ def make_batch(
     if "seed" in fields:
         raise TypeError("seed is no option of an environment; give it to reset(seed=...)")
     mission = make_mission(mission, preset=preset, **fields)
-    components = Components(channel=channel, controller=controller, scene=scene)
+    components = Components(channel=channel, controller=controller, scene=scene, pilot=pilot)
     # Copies: a component may draw or remember, and another environment may be given the same one.
     components = copy.deepcopy(components.made(mission))
     arena_of(mission)  # refuses one that is not there
@@ -189,7 +194,7 @@ def truth_space(mission: Mission) -> spaces.Box:
     """Return the space of `truth`: all numbers are normalised, and none has a unit."""
     num_robots = mission.num_robots
     most = largest_feature(mission)
-    return spaces.Box(-most, most, (num_truths(num_robots),), np.float32)
+    return spaces.Box(-most, most, (num_truths(num_robots, mission.num_axes),), np.float32)
 
 
 def truth(batch: MissionBatch) -> Float32[np.ndarray, "B S"]:

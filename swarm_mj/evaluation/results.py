@@ -12,6 +12,7 @@ import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_column
+from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
@@ -58,6 +59,9 @@ class Result:
     channel: str | None = later_column(lambda own: own.component("channel"), older=None)
     controller: str | None = later_column(lambda own: own.component("controller"), older=None)
     scene: str | None = later_column(lambda own: own.component("scene"), older=None)
+    pilot: str | None = later_column(lambda own: own.component("pilot"), older=None)
+    # The robots' bodies.
+    robot: str = later_column(lambda own: own.mission.robot, older=POINT)
     # Of the radio [bit/s]; None: packets of any size fit.
     bit_rate: float | None = later_column(lambda own: own.mission.bit_rate, older=None)
     # What packets carry beyond T, M and P (II-B): its name, or "none".

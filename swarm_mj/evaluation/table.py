@@ -17,6 +17,7 @@ from swarm_mj.evaluation.results import (
     has_memory,
 )
 from swarm_mj.evaluation.table_columns import BRIEF, NONE, WIDE, Shown, number, said
+from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.presets import paper
 from swarm_mj.mission.surroundings import OPEN
@@ -79,6 +80,8 @@ def missions_title(result: Result) -> str:
         "channel": result.channel,
         "controller": result.controller,
         "scene": result.scene,
+        "pilot": result.pilot,
+        "robot": None if result.robot == POINT else result.robot,
         "bit rate": None if result.bit_rate is None else bits_per_second(result.bit_rate),
         "arena": None if result.arena == OPEN else result.arena,
         "prior knowledge": None if result.prior_knowledge == NOTHING else result.prior_knowledge,

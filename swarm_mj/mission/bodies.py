@@ -36,7 +36,7 @@ def _split(robot: str) -> list[tuple[str, str]]:
 
 @dataclass(frozen=True, kw_only=True)
 class Bodies(Team):
-    """What the robots are, how high they fly, and the air around them."""
+    """The robots' kind, how high they fly, and the air around them."""
 
     # The kinds are those of `physics.robots`, which this room is before.
     robot: str = setting(

@@ -1,7 +1,7 @@
 """Robots with bodies: B worlds of MuJoCo models, each steered by its pilot, one window a call.
 
 The paper's equation gives no body its velocity, but the set point of its pilot: the acceleration,
-clipped to A_max, moves the set point, clipped to V_max per axis (Eq. 15). At the edge of the area
+clipped to A_max, moves the set point, clipped to V_max per axis. At the edge of the area
 the set point is mirrored, so bodies turn there as well as they can. A body that flies and touches
 anything has crashed: its rotors stop, and so does its radio.
 """
@@ -22,7 +22,6 @@ from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
 from swarm_mj.physics.robots import (
     FREE_QPOS,
     PLANAR_QPOS,
-    MakePilot,
     RobotKind,
     kinds_of,
     make_pilots,
@@ -33,11 +32,12 @@ from swarm_mj.physics.worlds import check_accelerations
 from swarm_mj.system.compiled import compiled
 
 FREE_QVEL = 6
-LEAST_HEIGHT_M = 0.5  # to which robots that fly can be told to sink
+FARTHEST_M = 1e6  # no robot of a stable model gets so far
+LEAST_HEIGHT_M = 0.5  # below which no set point is
 
 
 class _Flown(NamedTuple):
-    """The robots of a kind, and their part of MuJoCo's arrays; views, which MuJoCo changes."""
+    """The robots of a kind, and their part of MuJoCo's arrays: views, which steps change."""
 
     kind: RobotKind
     pilot: Pilot
@@ -49,7 +49,7 @@ class _Flown(NamedTuple):
     sensors: Float[np.ndarray, "B n S"]
 
 
-class Bodies:
+class BodyWorlds:
     """B MuJoCo worlds of N robots with bodies.
 
     Attributes:
@@ -65,7 +65,7 @@ class Bodies:
         num_missions: int,
         *,
         scene: Scene | None = None,
-        pilot: MakePilot | None = None,
+        pilot: Pilot | str | None = None,
         num_threads: int = 1,
     ) -> None:
         """Compile the scene and make B worlds.
@@ -74,11 +74,12 @@ class Bodies:
             mission: Of all worlds.
             num_missions: B.
             scene: A user's, which adds to the arena.
-            pilot: A user's, which makes controls in place of the shipped ones.
+            pilot: A user's, or its name, which makes controls in place of a shipped one.
             num_threads: Of MuJoCo's own.
 
         Raises:
-            ValueError: A robot's model or the scene is refused, or does not compile.
+            ValueError: A robot's model, the pilot or the scene is refused.
+            TypeError: The pilot is not called as one is.
         """
         self._mission = mission
         kinds = kinds_of(mission)
@@ -121,6 +122,11 @@ class Bodies:
             robots = slice(kind.first, kind.first + kind.num_robots)
             found.append(_Flown(kind, pilot, robots, *parts))
         return found
+
+    @property
+    def pose(self) -> tuple[Float[np.ndarray, "B Q"], Float[np.ndarray, "B V"]]:
+        """MuJoCo's coordinates of all worlds and their rates, as they are now."""
+        return self._batch.bind("qpos"), self._batch.bind("qvel")
 
     def draw_heights_m(self, rng: np.random.Generator) -> Float[np.ndarray, "N"]:
         """Return where robots begin: those that fly in the mission's range, others on the floor."""
@@ -249,8 +255,9 @@ class Bodies:
             position_m[:, flown.robots] = sensed.position_m
             velocity_mps[:, flown.robots] = sensed.velocity_mps
             attitude[:, flown.robots] = sensed.attitude
-        if not np.all(np.isfinite(position_m)):
-            b, i, _ = np.argwhere(~np.isfinite(position_m))[0]
+        is_somewhere = np.abs(position_m) < FARTHEST_M  # which nothing is that is no number
+        if not np.all(is_somewhere):
+            b, i, _ = np.argwhere(~is_somewhere)[0]
             raise ValueError(
                 f"robot {i} of mission {b} is nowhere: its model is not stable under its pilot; "
                 "choose lower gains, or a shorter timestep in its file"
@@ -302,7 +309,7 @@ def _move_set_points(
     wanted_mps: Float[np.ndarray, "B N 3"],
     height_m: Float[np.ndarray, "B N"],
 ) -> None:
-    """Accelerate, clip, and turn round at the edge (Eq. 15); heights follow what climbs."""
+    """Accelerate, clip, and turn round at the edge; heights follow what climbs."""
     for b in range(acceleration.shape[0]):
         for i in range(acceleration.shape[1]):
             for axis in range(3):

@@ -28,7 +28,7 @@ GRAVITY_MPS2 = 9.81
 
 @dataclass(frozen=True, kw_only=True)
 class Airframe:
-    """What a pilot is told of a robot's model, once."""
+    """A robot's model, as a pilot is made for it."""
 
     mass_kg: float  # of the whole robot
     inertia_kgm2: Float[np.ndarray, "3"]  # of its base, about the axes of its frame
@@ -50,7 +50,7 @@ class Sensed(NamedTuple):
 
 
 class SetPoint(NamedTuple):
-    """What all robots of a kind are to do, in B missions."""
+    """The motion that all robots of a kind are to have, in B missions."""
 
     velocity_mps: Float[np.ndarray, "B n 3"]
     height_m: Float[np.ndarray, "B n"]  # of robots that fly

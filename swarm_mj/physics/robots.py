@@ -9,7 +9,7 @@ import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
@@ -20,27 +20,28 @@ from mujoco._structs import MjModel
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arena_files import read_mjcf, take_over_settings
 from swarm_mj.physics.pilots import Airframe, Pilot, QuadrotorPilot, RoverPilot
-from swarm_mj.system.arguments import did_you_mean
+from swarm_mj.system.arguments import check_callable, did_you_mean
 from swarm_mj.system.packages import asset
+from swarm_mj.system.user_code import make
 
 LEAST_STEP_S = 0.0005
 MOST_STEP_S = 0.01
 FREE_QPOS = 7  # of a free base: a place and a quaternion
 PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
 
-MakePilot = Callable[[Airframe], Pilot]
+CALLED_WITH = ("sensed", "wanted", "control")  # a pilot
 
 
-class Listed(NamedTuple):
+class Shipped(NamedTuple):
     """A robot of the package."""
 
     file: str  # in `assets`
-    pilot: MakePilot
+    pilot: Callable[[Airframe], Pilot]
 
 
-LISTED = {
-    "quadrotor": Listed("quadrotor.xml", QuadrotorPilot),
-    "rover": Listed("rover.xml", RoverPilot),
+SHIPPED = {
+    "quadrotor": Shipped("quadrotor.xml", QuadrotorPilot),
+    "rover": Shipped("rover.xml", RoverPilot),
 }
 
 
@@ -82,7 +83,7 @@ class RobotKind:
         return reach_m
 
     def airframe(self, step_s: float) -> Airframe:
-        """Return what a pilot is told of the model, for this step of MuJoCo's."""
+        """Return the model as a pilot is made for it, at this step of MuJoCo's."""
         model = self.model
         is_limited = model.actuator_ctrllimited.astype(bool)
         least, most = model.actuator_ctrlrange.T
@@ -115,23 +116,25 @@ def kinds_of(mission: Mission) -> list[RobotKind]:
 
 
 def make_pilots(
-    kinds: Sequence[RobotKind], step_s: float, own: MakePilot | None = None
+    kinds: Sequence[RobotKind], step_s: float, own: Pilot | str | None = None
 ) -> list[Pilot]:
     """Return the pilot of each kind.
 
     Args:
         kinds: Of a team.
         step_s: MuJoCo's step [s].
-        own: A user's. It steers the robots whose model is a file; without such, those of the one
-            kind that there is.
+        own: A user's, or its name, `module:Name`. It steers the robots whose model is a file;
+            without such, those of the one kind that there is.
 
     Returns:
         The pilots, in the order of kinds.
 
     Raises:
-        ValueError: A kind has no pilot or is refused by it, or nothing needs the user's own.
+        ValueError: A kind has no pilot or is refused by it, or nothing needs the user's own, or
+            that cannot be loaded.
+        TypeError: It is not called as a pilot is.
     """
-    has_files = any(kind.name not in LISTED for kind in kinds)
+    has_files = any(kind.name not in SHIPPED for kind in kinds)
     if own is not None and len(kinds) > 1 and not has_files:
         names = " or ".join(kind.name for kind in kinds)
         raise ValueError(
@@ -140,20 +143,25 @@ def make_pilots(
         )
     pilots = []
     for kind in kinds:
-        is_file = kind.name not in LISTED
-        chosen = None if is_file else LISTED[kind.name].pilot
+        is_file = kind.name not in SHIPPED
+        airframe = kind.airframe(step_s)
         if own is not None and (is_file or not has_files):
-            chosen = own
-        if chosen is None:
+            pilots.append(_own_pilot(own, airframe))
+        elif is_file:
             raise ValueError(
                 f"robot {kind.name} needs a pilot, which makes its controls; give --pilot "
                 "module:Name"
             )
-        try:
-            pilots.append(chosen(kind.airframe(step_s)))
-        except ValueError as error:
-            raise ValueError(f"robot {kind.name}: {error}") from error
+        else:
+            pilots.append(SHIPPED[kind.name].pilot(airframe))
     return pilots
+
+
+def _own_pilot(own: Pilot | str, airframe: Airframe) -> Pilot:
+    """Return a user's pilot; a class is made for the airframe."""
+    made: Any = make("pilot", own, airframe) if isinstance(own, str) else own
+    check_callable("pilot", made, CALLED_WITH)
+    return made
 
 
 def add_robots(spec: MjSpec, kinds: Sequence[RobotKind], contype: int, conaffinity: int) -> None:
@@ -196,11 +204,11 @@ def heading_of(attitude: Float[np.ndarray, "4"]) -> float:
 
 def _read(kind: str) -> MjSpec:
     """Return a kind's model, or raise ValueError in one line."""
-    if kind in LISTED:
-        return MjSpec.from_file(str(asset(LISTED[kind].file)))
+    if kind in SHIPPED:
+        return MjSpec.from_file(str(asset(SHIPPED[kind].file)))
     if not kind.endswith((".xml", ".mjcf")):
-        known = f"point, {', '.join(LISTED)}, or an MJCF file"
-        raise ValueError(f"robot must be {known}, not {kind!r}{did_you_mean(kind, LISTED)}")
+        known = f"point, {', '.join(SHIPPED)}, or an MJCF file"
+        raise ValueError(f"robot must be {known}, not {kind!r}{did_you_mean(kind, SHIPPED)}")
     if not Path(kind).is_file():
         raise ValueError(f"robot {kind}: there is no such file")
     return read_mjcf("robot", kind)
@@ -208,7 +216,7 @@ def _read(kind: str) -> MjSpec:
 
 def _compiled(kind: str, spec: MjSpec) -> MjModel:
     try:
-        return spec.copy().compile()
+        return spec.compile()
     except ValueError as error:  # MuJoCo's, in several lines
         raise ValueError(f"robot {kind}: {' '.join(str(error).split())}") from error
 

@@ -78,6 +78,13 @@ class Physics:
         self._ctrl[...] = velocity_mps if self._mission.physics == "exact" else 0.0
         self.states = RobotStates(position_m=position_m.copy(), velocity_mps=velocity_mps.copy())
 
+    @property
+    def pose(self) -> tuple[Float[np.ndarray, "B Q"], Float[np.ndarray, "B V"]]:
+        """MuJoCo's coordinates of all worlds, which are p, and their rates, which are v."""
+        num_missions = len(self.states.position_m)
+        position_m = self.states.position_m.reshape(num_missions, -1)
+        return position_m, self.states.velocity_mps.reshape(num_missions, -1)
+
     def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
         """Make these the active robots from now on; the others keep moving."""
         self.states = replace(self.states, is_active=is_active)

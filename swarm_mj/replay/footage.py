@@ -91,6 +91,7 @@ class Facts:
     channel: str | None = None  # the names of the user's own parts
     controller: str | None = None
     scene: str | None = None
+    pilot: str | None = None
 
     @property
     def own_parts(self) -> list[str]:
@@ -151,7 +152,6 @@ class Footage:
                 row=packets.row[first:after],
                 start_m=packets.start_m[first:after],
                 end_m=packets.end_m[first:after],
-                up_m=None if packets.up_m is None else packets.up_m[first:after],
             )
         return found
 

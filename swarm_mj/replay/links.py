@@ -9,6 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.radio.composed import strong_groups
 from swarm_mj.radio.mission_radio import by_robot, radio_of
 from swarm_mj.replay import palette
@@ -17,8 +18,8 @@ from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.decibels import to_db
 
 Phases: TypeAlias = Int[np.ndarray, "T 2 N"]  # a robot for each one in both phases of windows
-Positions: TypeAlias = Float[np.ndarray, "T N 2"]  # of all robots in each window [m]
-Points: TypeAlias = Float[np.ndarray, "L 2"]  # an end of each packet [m]
+Positions: TypeAlias = Float[np.ndarray, "T N D"]  # of all robots in each window [m]
+Points: TypeAlias = Float[np.ndarray, "L D"]  # an end of each packet [m]; of bodies with heights
 
 SEGMENTS = 6  # straight pieces of an arc
 RISE = 0.22  # of an arc's top, by its span
@@ -59,18 +60,12 @@ class PacketPaths(NamedTuple):
     """L packets with the same fate, sorted by window."""
 
     row: Int[np.ndarray, "L"]  # the window, 0 to T - 1
-    start_m: Points  # where the sender is on the map
+    start_m: Points  # where the sender is
     end_m: Points  # where the receiver is
-    up_m: Float[np.ndarray, "L 2"] | None = None  # how high both are; None: they are points
 
 
 def fates(
-    recipient: Phases,
-    heard: Phases,
-    position_m: Positions,
-    *,
-    is_broadcast: bool,
-    height_m: Float[np.ndarray, "T N"] | None = None,
+    recipient: Phases, heard: Phases, position_m: Positions, *, is_broadcast: bool
 ) -> dict[Fate, PacketPaths]:
     """Sort the packets of T windows by their fate, in the order of drawing.
 
@@ -78,7 +73,7 @@ def fates(
     `unanswered` ones end at the robot they were meant for, which did not decode them; a packet that
     k other robots overheard is k packets here. Broadcasts have no addressee: `heard` leads to each
     hearer. The second phase answers the first. `recipient` is S^i in both phases, `heard` the
-    sender that each robot decoded; a robot's own number is none. `height_m` is that of bodies.
+    sender that each robot decoded; a robot's own number is none.
     """
     # A robot decodes at most one packet in a phase, so `heard` has every reception once.
     row, phase, hearer = np.nonzero(is_other(heard))
@@ -104,10 +99,7 @@ def fates(
     for fate, (row, sender, receiver) in found.items():
         start_m = position_m[row, sender]
         end_m = position_m[row, receiver]
-        up_m = None
-        if height_m is not None:
-            up_m = np.stack([height_m[row, sender], height_m[row, receiver]], axis=1)
-        paths[fate] = PacketPaths(row=row, start_m=start_m, end_m=end_m, up_m=up_m)
+        paths[fate] = PacketPaths(row=row, start_m=start_m, end_m=end_m)
     return paths
 
 
@@ -122,6 +114,11 @@ def lifted(
     """Return points at a height above the ground, one for all or each its own [m]."""
     up_m = np.broadcast_to(height_m, at_m.shape[:-1])
     return np.concatenate([at_m, up_m[..., None]], axis=-1)
+
+
+def on_map(at_m: Float[np.ndarray, "*S D"]) -> Float[np.ndarray, "*S 2"]:
+    """Return points of the plane, or of space, as the map shows them [m]."""
+    return at_m[..., :PLANE]
 
 
 def flattened(at_m: Float[np.ndarray, "*S 3"]) -> Float[np.ndarray, "*S 2"]:
@@ -139,11 +136,10 @@ def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.nd
     span_m = np.linalg.norm(way_m, axis=1)
     # The longer the higher: packets that cross on the ground stay apart in the picture.
     height_m = base_m + 4.0 * RISE * span_m[:, None] * along * (1.0 - along)
-    if packets.up_m is not None:
-        start_m, end_m = packets.up_m.T
-        height_m = height_m + start_m[:, None] + share * along * (end_m - start_m)[:, None]
-    ground_m = packets.start_m[:, None] + along[:, None] * way_m[:, None]
-    return np.concatenate([ground_m, height_m[..., None]], axis=2)
+    points_m = packets.start_m[:, None] + along[:, None] * way_m[:, None]
+    if points_m.shape[2] > PLANE:  # of bodies, which have heights of their own
+        height_m = height_m + points_m[..., PLANE]
+    return np.concatenate([points_m[..., :PLANE], height_m[..., None]], axis=2)
 
 
 class LinkMismatch(NamedTuple):

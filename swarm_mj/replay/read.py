@@ -185,8 +185,9 @@ def _packets(columns: Columns, *, has_bodies: bool) -> dict[Fate, PacketPaths]:
         strips = columns.get((layers.PACKET_ARCS[fate].path, "LineStrips3D:strips"))
         if strips is None:  # addressed packets have other fates than broadcasts
             continue
-        raised_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
-        points_m = flattened(raised_m)
+        points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
+        if not has_bodies:
+            points_m = flattened(points_m)
         start_m = points_m[:, 0]  # the first point of each arc, and the last:
         # From the way that is drawn to the whole one.
         way_m = (points_m[:, -1] - start_m) / style.share
@@ -194,7 +195,6 @@ def _packets(columns: Columns, *, has_bodies: bool) -> dict[Fate, PacketPaths]:
             row=_rows(strips),
             start_m=start_m,
             end_m=start_m + way_m,
-            up_m=raised_m[:, [0, -1], 2] if has_bodies else None,
         )
     return found
 

@@ -44,8 +44,6 @@ class _Rows(NamedTuple):
     recipient: Int[np.ndarray, "R 2 N"]
     heard: Int[np.ndarray, "R 2 N"]
     is_on: Bool[np.ndarray, "R N"]
-    height_m: Float[np.ndarray, "R N"] | None
-    attitude: Float[np.ndarray, "R N 4"] | None
     believed_m: Float[np.ndarray, "R N 2"]
     ego_age: Float[np.ndarray, "R N"]
     known_age: Float[np.ndarray, "R N"]
@@ -56,7 +54,19 @@ class _Rows(NamedTuple):
     velocity_variance_m2ps2: Float[np.ndarray, "R"]
 
 
-def _room(num_windows: int, num_robots: int, *, has_bodies: bool) -> _Rows:
+class _BodyRows(NamedTuple):
+    """The height and attitude of robots with bodies, likewise."""
+
+    height_m: Float[np.ndarray, "R N"]
+    attitude: Float[np.ndarray, "R N 4"]
+
+
+def _room_for_bodies(num_windows: int, num_robots: int) -> _BodyRows:
+    robots = (num_windows, num_robots)
+    return _BodyRows(height_m=np.empty(robots), attitude=np.empty((*robots, 4)))
+
+
+def _room(num_windows: int, num_robots: int) -> _Rows:
     """Return room for windows; memory that is not written yet is not taken yet."""
     robots = (num_windows, num_robots)
     return _Rows(
@@ -65,8 +75,6 @@ def _room(num_windows: int, num_robots: int, *, has_bodies: bool) -> _Rows:
         recipient=np.empty((num_windows, 2, num_robots), dtype=np.int64),
         heard=np.empty((num_windows, 2, num_robots), dtype=np.int64),
         is_on=np.empty(robots, dtype=np.bool_),
-        height_m=np.empty(robots) if has_bodies else None,
-        attitude=np.empty((*robots, 4)) if has_bodies else None,
         believed_m=np.empty((*robots, 2)),
         ego_age=np.empty(robots),
         known_age=np.empty(robots),
@@ -112,7 +120,10 @@ class Recorder:
         self._ego = ego
         self._index = index
         self._num_rows = 0  # whole ones
-        self._rows = _room(first_room, num_robots, has_bodies=swarm.mission.has_bodies)
+        self._rows = _room(first_room, num_robots)
+        self._body_rows = None
+        if swarm.mission.has_bodies:
+            self._body_rows = _room_for_bodies(first_room, num_robots)
         # Half the memory; the picture has 256 shades.
         self._age = np.empty((-(-first_room // self._stride), *matrix), dtype=np.float32)
         self._task_costs: list[TaskCost] = []
@@ -146,9 +157,11 @@ class Recorder:
         num_rows = 2 * len(self._rows.age_mean)
         larger = {}
         for name, array in self._rows._asdict().items():
-            larger[name] = None if array is None else _enlarged(array, num_rows)
+            larger[name] = _enlarged(array, num_rows)
         self._age = _enlarged(self._age, -(-num_rows // self._stride))
         self._rows = _Rows(**larger)
+        if self._body_rows is not None:
+            self._body_rows = _BodyRows(*(_enlarged(each, num_rows) for each in self._body_rows))
 
     def _copy_states(self, row: int) -> None:
         """Copy where the robots are and what they did, and what the ego robot knows."""
@@ -159,10 +172,9 @@ class Recorder:
         buffers = swarm.buffers
         rows.position_m[row] = states.position_m[index, :, :PLANE]
         rows.velocity_mps[row] = states.velocity_mps[index, :, :PLANE]
-        if rows.height_m is not None and rows.attitude is not None:
-            assert states.attitude is not None
-            rows.height_m[row] = states.position_m[index, :, PLANE]
-            rows.attitude[row] = states.attitude[index]
+        if self._body_rows is not None and states.attitude is not None:
+            self._body_rows.height_m[row] = states.position_m[index, :, PLANE]
+            self._body_rows.attitude[row] = states.attitude[index]
         rows.is_on[row] = self._all_on if states.is_active is None else states.is_active[index]
         rows.believed_m[row] = buffers.position_m[index, self._ego, :, :PLANE]
         rows.parent[row] = buffers.parent[index, self._ego]
@@ -194,7 +206,7 @@ class Recorder:
     @property
     def window_bytes(self) -> float:
         """The memory that a window takes, but for snapshots of the radio."""
-        row_bytes = sum(array[0].nbytes for array in self._rows if array is not None)
+        row_bytes = sum(array[0].nbytes for array in (*self._rows, *(self._body_rows or ())))
         return row_bytes + self._age[0].nbytes / self._stride
 
     @property
@@ -231,7 +243,10 @@ class Recorder:
 
     def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
         """Return the windows from a row on, up to another."""
-        flown = _Rows(*(None if each is None else each[first:after] for each in self._rows))
+        flown = _Rows(*(array[first:after] for array in self._rows))
+        height_m = attitude = None
+        if self._body_rows is not None:
+            height_m, attitude = (array[first:after] for array in self._body_rows)
         lead = slice(max(0, first - LEAD_WINDOWS), first)
         compared = self._compared(flown.is_on, first)
         window = np.arange(first + 1, after + 1)
@@ -243,9 +258,8 @@ class Recorder:
         packets = links.fates(
             flown.recipient,
             flown.heard,
-            flown.position_m,
+            flown.position_m if height_m is None else links.lifted(flown.position_m, height_m),
             is_broadcast=facts.is_broadcast,
-            height_m=flown.height_m,
         )
         return Log(
             facts=facts,
@@ -261,6 +275,8 @@ class Recorder:
             age_window=np.arange(matrices.start, matrices.stop) * self._stride + 1,
             age=self._age[matrices],
             task_cost=replace(costs[0], value=value) if costs else None,
+            height_m=height_m,
+            attitude=attitude,
             **flown._asdict(),
             **compared._asdict(),
         )

@@ -27,6 +27,7 @@ from swarm_mj.replay.links import (
     ends,
     is_other,
     lifted,
+    on_map,
 )
 from swarm_mj.replay.log import LEAD_WINDOWS, Log
 from swarm_mj.replay.palette import LinkKind
@@ -275,14 +276,16 @@ def _draw_packets(out: RerunLog) -> None:
     log = out.log
     if not log.facts.is_broadcast:
         lost = log.packets["lost"]
-        out.lines(layers.LOST_REST, lost.start_m, lost.end_m, lost.row)
+        out.lines(layers.LOST_REST, on_map(lost.start_m), on_map(lost.end_m), lost.row)
     for fate, packets in log.packets.items():
+        start_m = on_map(packets.start_m)
+        end_m = on_map(packets.end_m)
         if fate in layers.PACKET_LINES:
             line = layers.PACKET_LINES[fate]
-            out.lines(line, packets.start_m, packets.end_m, packets.row)
+            out.lines(line, start_m, end_m, packets.row)
             continue
-        way_m = packets.end_m - packets.start_m
-        origins_m = packets.start_m
+        way_m = end_m - start_m
+        origins_m = start_m
         if fate in ("answered", "unanswered"):  # an answer stands beside its request, to the left
             length_m = np.maximum(np.linalg.norm(way_m, axis=1, keepdims=True), 1e-6)
             aside_m = ASIDE_SHARE * out.unit_m

@@ -1,4 +1,4 @@
-"""A mission's channel, controller and scene: its own, a user's objects, or their names."""
+"""A mission's channel, controller, scene and pilot: its own, a user's objects, or their names."""
 
 import hashlib
 from collections.abc import Mapping
@@ -9,6 +9,8 @@ from typing import Any, TypedDict
 
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
+from swarm_mj.physics.pilots import Pilot
+from swarm_mj.physics.robots import CALLED_WITH as CALLED_AS_PILOT
 from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.free_space import Channel, VaryingChannel
@@ -24,6 +26,7 @@ CALLED_WITH = {  # the kinds of components, and the arguments of each
     "channel": ("position_m", "recipient"),
     "controller": ("buffers", "states"),
     "scene": ("spec", "mission"),
+    "pilot": CALLED_AS_PILOT,
 }
 TABLE = "table:"  # begins the name of a channel that is a table of gains
 
@@ -34,6 +37,7 @@ class GivenParts(TypedDict, total=False):
     channel: Channel | VaryingChannel | str
     controller: Controller | str
     scene: Scene | str
+    pilot: Pilot | str
 
 
 def _files(component: object) -> list[Path]:
@@ -47,7 +51,7 @@ def _files(component: object) -> list[Path]:
 
 @dataclass(frozen=True, kw_only=True)
 class Components:
-    """A mission's channel, controller and scene: objects or names; None is the mission's own.
+    """A mission's channel, controller, scene and pilot: objects or names; None is its own.
 
     Raises TypeError for what is neither a name nor called as its kind is.
     """
@@ -68,6 +72,14 @@ class Components:
         **OWN,
     )
 
+    pilot: Any = setting(
+        None,
+        "what makes the controls of robots with bodies",
+        shown="the robot's",
+        reads=_files,
+        **OWN,
+    )
+
     def __post_init__(self) -> None:
         for kind, component in self.given.items():
             # A channel that varies from slot to slot is asked for each slot's, not called.
@@ -84,6 +96,8 @@ class Components:
             given["controller"] = self.controller
         if self.scene is not None:
             given["scene"] = self.scene
+        if self.pilot is not None:
+            given["pilot"] = self.pilot
         return given
 
     @property
@@ -100,7 +114,7 @@ class Components:
         return "".join(f", {kind} {name}" for kind, name in self.names.items())
 
     def made(self, mission: Mission) -> "Components":
-        """Return objects in place of names.
+        """Return objects in place of names, but for a pilot's, which is made for its robots.
 
         Args:
             mission: What they are made for.
@@ -114,7 +128,11 @@ class Components:
         """
         made = self
         for kind, name in self.given.items():
-            if not isinstance(name, str):
+            if kind == "pilot" and not mission.has_bodies:
+                raise ValueError(
+                    "a pilot steers robots with bodies, and a point needs none; choose a robot"
+                )
+            if not isinstance(name, str) or kind == "pilot":
                 continue
             if kind == "channel" and beyond_free_space(mission):
                 raise ValueError(

@@ -43,6 +43,7 @@ class Link:
         if mission.arena != OPEN:
             raise ValueError(f"a Link has no obstacles: arena must be open, not {mission.arena}")
         self._shape = len(seeds), mission.num_robots
+        self._num_axes = mission.num_axes
         self._now = np.zeros(len(seeds))
         self._channel = mission_radio(mission).channel
         if isinstance(self._channel, Started):
@@ -54,7 +55,7 @@ class Link:
         A single mission needs no axis B, neither here nor in what is returned.
 
         Args:
-            position_m: Where the robots are, [B, N, 2], [m].
+            position_m: Where the robots are, [B, N, D], [m]; D is 2, or of bodies 3.
             wants_to_send: Who sends to everyone, [B, N]; or, as integers, whom each robot
                 addresses, itself for silence and -1 for everyone.
 
@@ -70,10 +71,10 @@ class Link:
         if rows.dtype == np.bool_ and rows.shape == self._shape:
             rows = np.where(rows, BROADCAST, np.arange(self._shape[1]))
         recipient = checked_robots("wants_to_send", rows, self._shape, may_broadcast=True)
-        place_m = _checked_places(position_m, due=(*sends.shape, 2))
+        place_m = _checked_places(position_m, due=(*sends.shape, self._num_axes))
         self._now += SLOT_WINDOWS
         channel = channel_at(self._channel, self._now)
-        heard = channel(place_m.reshape(*self._shape, 2), recipient)
+        heard = channel(place_m.reshape(*self._shape, self._num_axes), recipient)
         return heard.reshape(sends.shape)
 
 

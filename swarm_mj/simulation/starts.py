@@ -9,7 +9,7 @@ from jaxtyping import Bool, Float
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.mission.placement import connected_positions
-from swarm_mj.physics.bodies import Bodies
+from swarm_mj.physics.bodies import BodyWorlds
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
 from swarm_mj.policies.policy import Policy, check_parameters
 from swarm_mj.protocol.packets import Packet
@@ -27,7 +27,7 @@ class Starts:
     mission: Mission
     obstacles: Obstacles | None
     channel: ComposedChannel | None  # that says who is connected; None: distances say it
-    bodies: Bodies | None = None  # None: robots are points
+    bodies: BodyWorlds | None = None  # None: robots are points
 
     def positions(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N D"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""

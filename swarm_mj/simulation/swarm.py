@@ -12,7 +12,8 @@ from swarm_mj.control.motion import Controller, controller_of, costed, initial_v
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
 from swarm_mj.mission.placement import draw_survivors
-from swarm_mj.physics.bodies import Bodies
+from swarm_mj.physics.bodies import BodyWorlds
+from swarm_mj.physics.pilots import Pilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
@@ -40,11 +41,16 @@ MAX_THREADS = 1024
 
 
 def physics_of(
-    mission: Mission, num_missions: int, scene: Scene | None, num_threads: int
-) -> Physics | Bodies:
+    mission: Mission,
+    num_missions: int,
+    *,
+    scene: Scene | None,
+    pilot: Pilot | str | None,
+    num_threads: int,
+) -> Physics | BodyWorlds:
     """Return the worlds of a mission's robots, be they points or bodies."""
     if mission.has_bodies:
-        return Bodies(mission, num_missions, scene=scene, num_threads=num_threads)
+        return BodyWorlds(mission, num_missions, scene=scene, pilot=pilot, num_threads=num_threads)
     return Physics(mission, num_missions, scene=scene, num_threads=num_threads)
 
 
@@ -61,10 +67,12 @@ class Swarm:
         controller: What drives the robots; None is the task's own.
         scene: A function that edits the MuJoCo model, the same in all missions; None leaves the
             mission's arena as it is.
+        pilot: What makes the controls of robots with bodies, as an object or `module:Name`; None is
+            the robot's own.
         num_threads: Threads of MuJoCo, from 1 to 1024.
 
     Attributes:
-        states: Where the robots truly are, [B N D] each, and who is active.
+        states: Where the robots truly are, [B N D] each, and who is active; D is 3 of bodies.
         buffers: What the robots know; entry `[b, i, j]` is what i knows about j.
         views: The same as robots see it: read only, with the clock and the last packets.
         now: t on the synchronised clock, [B], [windows].
@@ -92,11 +100,14 @@ class Swarm:
         channel: str | Channel | VaryingChannel | None = None,
         controller: str | Controller | None = None,
         scene: str | Scene | None = None,
+        pilot: str | Pilot | None = None,
         num_threads: int = 1,
     ) -> None:
         """Place the robots and start all missions, each from its own seed."""
         check_kind("mission", mission, Mission, 'paper("flocking")')
-        own = Components(channel=channel, controller=controller, scene=scene).made(mission)
+        own = Components(channel=channel, controller=controller, scene=scene, pilot=pilot).made(
+            mission
+        )
         check_seeds(seeds)
         if not isinstance(num_threads, Integral) or not 1 <= num_threads <= MAX_THREADS:
             limits = f"from 1 to {MAX_THREADS}"
@@ -104,7 +115,9 @@ class Swarm:
         self.mission = mission
         self.scene = own.scene
         self._num_missions = len(seeds)
-        self._physics = physics_of(mission, len(seeds), own.scene, num_threads)
+        self._physics = physics_of(
+            mission, len(seeds), scene=own.scene, pilot=own.pilot, num_threads=num_threads
+        )
 
         # The channel that packets take, and what robots and a centre know of it.
         radio = mission_radio(mission, self._physics.obstacles, own.channel)
@@ -151,7 +164,7 @@ class Swarm:
         """Draw where the robots begin, how fast, who will fail, and errors of localisation."""
         mission = self.mission
         rngs = self._rngs
-        bodies = self._physics if isinstance(self._physics, Bodies) else None
+        bodies = self._physics if isinstance(self._physics, BodyWorlds) else None
         starts = Starts(mission, self._physics.obstacles, self.truth.channel, bodies)
         position_m = [starts.positions(b, rng) for b, rng in enumerate(rngs.placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
@@ -191,6 +204,11 @@ class Swarm:
     def states(self) -> RobotStates:
         """Where the robots truly are, and who is active."""
         return self._physics.states
+
+    @property
+    def pose(self) -> tuple[Float[np.ndarray, "B Q"], Float[np.ndarray, "B V"]]:
+        """MuJoCo's coordinates of the robots, and their rates, for viewers."""
+        return self._physics.pose
 
     @property
     def views(self) -> LocalViews:

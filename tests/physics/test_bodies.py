@@ -1,0 +1,212 @@
+"""Worlds of robots with bodies: set points, wind, crashes, and the same mission in any batch."""
+
+import numpy as np
+import pytest
+
+from swarm_mj import make_policy, paper
+from swarm_mj.physics.bodies import BodyWorlds
+from swarm_mj.simulation.swarm import Swarm
+
+BOX = """
+<mujoco>
+  <option timestep="0.005"/>
+  <worldbody>
+    <body name="base">
+      <freejoint/><geom type="box" size="0.2 0.2 0.2" mass="1"/><site name="s"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>
+</mujoco>
+"""
+
+
+class Resting:
+    """No lift at all: what it steers falls."""
+
+    def __call__(self, _sensed, _wanted, control):
+        control[:] = 0.0
+
+
+class Hovering:
+    """As much lift as weight, upwards as long as nothing turns the box."""
+
+    def __init__(self, airframe):
+        self.lift_n = 9.81 * airframe.mass_kg
+
+    def __call__(self, _sensed, _wanted, control):
+        control[:] = self.lift_n
+
+
+@pytest.fixture
+def box(tmp_path):
+    path = tmp_path / "box.xml"
+    path.write_text(BOX)
+    return str(path)
+
+
+def flown(mission, seeds, num_windows, policy="tdma", **options):
+    """The swarm after some windows."""
+    swarm = Swarm(mission, seeds, **options)
+    swarm.start(make_policy(policy, mission))
+    for _ in range(num_windows):
+        swarm.step()
+    return swarm
+
+
+def test_a_body_without_lift_falls_freely(box):
+    """g t² / 2, less what drag and Euler's steps change."""
+    mission = paper("stationary", robot=box, num_robots=3, height_m=100.0)
+    swarm = flown(mission, [1], 3, pilot=Resting())
+    fallen_m = 100.0 - swarm.states.position_m[0, :, 2]
+    np.testing.assert_allclose(fallen_m, 0.5 * 9.81 * 0.3**2, rtol=0.05)
+    np.testing.assert_allclose(swarm.states.velocity_mps[0, :, 2], -9.81 * 0.3, rtol=0.05)
+
+
+def test_its_terminal_speed_is_that_of_its_drag(box):
+    """MuJoCo's drag of a box, rho v² A / 2 downwards, is the weight at sqrt(2 m g / rho A)."""
+    mission = paper("stationary", robot=box, num_robots=2, height_m=1000.0, num_windows=300)
+    swarm = flown(mission, [1], 130, pilot=Resting())
+    terminal_mps = np.sqrt(2.0 * 1.0 * 9.81 / (1.204 * 0.4 * 0.4))
+    np.testing.assert_allclose(swarm.states.velocity_mps[0, :, 2], -terminal_mps, rtol=0.15)
+
+
+def test_what_lifts_its_weight_hovers_and_what_falls_on_the_floor_has_crashed(box):
+    mission = paper("stationary", robot=box, num_robots=3, height_m=2.0)
+    hovering = flown(mission, [1], 20, pilot=Hovering(_airframe_of(mission)))
+    np.testing.assert_allclose(hovering.states.position_m[0, :, 2], 2.0, atol=1e-9)
+    assert hovering.states.is_active is None
+
+
+def _airframe_of(mission):
+    from swarm_mj.physics.robots import kinds_of
+
+    [kind] = kinds_of(mission)
+    return kind.airframe(0.005)
+
+
+def test_two_robots_stay_on_whoever_crashes(box):
+    """An age needs a pair of robots, so the last that crash together count as before."""
+    mission = paper("stationary", robot=box, num_robots=3, height_m=1.0)
+    swarm = flown(mission, [1], 20, pilot=Resting())
+    assert np.all(swarm.states.position_m[0, :, 2] < 0.5)
+    assert swarm.states.is_active.sum() >= 2
+
+
+def test_a_pilot_is_named_too(box, tmp_path, monkeypatch):
+    (tmp_path / "hovering_pilot.py").write_text(
+        "class Pilot:\n"
+        "    def __init__(self, airframe):\n"
+        "        self.lift_n = 9.81 * airframe.mass_kg\n"
+        "    def __call__(self, sensed, wanted, control):\n"
+        "        control[:] = self.lift_n\n"
+    )
+    monkeypatch.chdir(tmp_path)
+    mission = paper("stationary", robot=box, num_robots=2, height_m=2.0)
+    swarm = flown(mission, [1], 3, pilot="hovering_pilot:Pilot")
+    np.testing.assert_allclose(swarm.states.position_m[0, :, 2], 2.0, atol=1e-9)
+
+
+def test_points_have_no_pilot():
+    with pytest.raises(ValueError, match="a point needs none; choose a robot"):
+        Swarm(paper("flocking", num_robots=2), [1], pilot=Resting())
+
+
+def test_a_pilot_whose_robots_fly_apart_is_named(box):
+    class Violent:
+        def __call__(self, _sensed, _wanted, control):
+            control[:] = 1e9
+
+    mission = paper("stationary", robot=box, num_robots=2)
+    with pytest.raises(ValueError, match="not stable under its pilot"):
+        flown(mission, [1], 2, pilot=Violent())
+
+
+@pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])
+def test_no_quadrotor_falls_in_calm(task):
+    mission = paper(task, robot="quadrotor", num_robots=20, range_ratio=0.5)
+    swarm = flown(mission, [1, 2], 100)
+    assert swarm.states.is_active is None
+    np.testing.assert_allclose(swarm.states.position_m[..., 2], 20.0, atol=0.5)
+
+
+def test_a_flock_of_quadrotors_agrees():
+    mission = paper("flocking", robot="quadrotor", num_robots=20)
+    swarm = Swarm(mission, [1])
+    first = np.var(swarm.states.velocity_mps[0], axis=0).sum()
+    swarm.start(make_policy("tdma", mission))
+    for _ in range(150):
+        costs = swarm.step()
+    assert costs.velocity_variance_m2ps2[0] < 0.01 * first
+
+
+def test_walking_robots_turn_at_the_edge():
+    """Within the way that they brake on."""
+    mission = paper("random-walk", robot="quadrotor:5,rover:5", num_robots=10, velocity_ratio=0.5)
+    swarm = flown(mission, [1], 200)
+    farthest_m = np.max(np.abs(swarm.states.position_m[..., :2]))
+    assert farthest_m < mission.half_side_m + 10.0
+
+
+def test_a_mission_is_the_same_in_any_batch_and_on_any_number_of_threads():
+    mission = paper("random-walk", robot="quadrotor", num_robots=8, range_ratio=0.6, gust_mps=2.0)
+    alone = flown(mission, [7], 20)
+    batch = flown(mission, [3, 7, 9], 20, num_threads=2)
+    np.testing.assert_array_equal(alone.states.position_m[0], batch.states.position_m[1])
+    np.testing.assert_array_equal(alone.states.attitude[0], batch.states.attitude[1])
+    assert not np.array_equal(batch.states.position_m[0], batch.states.position_m[2])
+
+
+def test_a_mission_begins_anew_as_it_began():
+    mission = paper("flocking", robot="quadrotor:3,rover:3", num_robots=6, gust_mps=1.0)
+    swarm = Swarm(mission, [4])
+    policy = make_policy("tdma", mission)
+    seen = []
+    for _ in range(2):
+        swarm.restart([4])
+        swarm.start(policy)
+        for _ in range(10):
+            swarm.step()
+        seen.append(swarm.states.position_m.copy())
+    np.testing.assert_array_equal(*seen)
+
+
+def test_gusts_have_the_deviation_and_the_time_that_were_asked_for():
+    """Of 400 worlds after each of 30 windows, without a mean."""
+    mission = paper("stationary", robot="rover", num_robots=2, gust_mps=2.0, gust_s=1.0)
+    worlds = BodyWorlds(mission, 400)
+    worlds.start_wind([np.random.default_rng(seed) for seed in range(400)])
+    winds = []
+    for _ in range(30):
+        winds.append(worlds._wind[:, :2].copy())
+        worlds._change_gusts()
+    winds = np.array(winds)
+    assert np.std(winds) == pytest.approx(2.0, rel=0.05)
+    correlation = np.mean(winds[0] * winds[10]) / np.mean(winds[0] ** 2)
+    assert correlation == pytest.approx(np.exp(-1.0), abs=0.15)
+    assert np.all(worlds._wind[:, 2] == 0.0)
+
+
+def test_heights_are_spread_over_their_range():
+    mission = paper("stationary", robot="quadrotor", height_m=10.0, height_range_m=30.0)
+    height_m = Swarm(mission, [1]).states.position_m[0, :, 2]
+    assert np.all((height_m >= 10.0) & (height_m <= 40.0))
+    assert np.ptp(height_m) > 15.0
+
+
+def test_quadrotors_among_trees_crash_and_are_off():
+    """At 5 m they meet trees of 10 m, which nobody avoids; above the trees they meet none."""
+    fields = {"arena": "forest", "num_robots": 20, "velocity_ratio": 0.5}
+    low = flown(paper("random-walk", robot="quadrotor", height_m=5.0, **fields), [1], 200)
+    assert low.states.is_active is not None
+    assert 2 <= low.states.is_active.sum() < 20
+    high = flown(paper("random-walk", robot="quadrotor", height_m=20.0, **fields), [1], 200)
+    assert high.states.is_active is None
+
+
+def test_robots_that_fail_keep_flying_and_those_that_crash_stay_off():
+    mission = paper(
+        "random-walk", robot="quadrotor", num_robots=20, num_windows=20, failure_fraction=0.25
+    )
+    swarm = flown(mission, [1], 20)
+    assert swarm.states.is_active.sum() == 15
+    np.testing.assert_allclose(swarm.states.position_m[..., 2], 20.0, atol=0.5)

@@ -1,0 +1,144 @@
+import numpy as np
+import pytest
+
+from swarm_mj import paper
+from swarm_mj.physics.pilots import Pilot, QuadrotorPilot, RoverPilot
+from swarm_mj.physics.robots import heading_of, kinds_of, make_pilots, pose_of
+from swarm_mj.physics.scene import compose
+
+BODY = '<body name="base"><freejoint/><geom size="0.1" mass="0.2"/><site name="s"/></body>'
+LIFT = '<actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>'
+
+
+def mjcf(body=BODY, actuator=LIFT, option='<option timestep="0.002"/>'):
+    floor = '<geom type="plane" size="5 5 1"/>'
+    return f"<mujoco>{option}<worldbody>{floor}{body}</worldbody>{actuator}</mujoco>"
+
+
+@pytest.fixture
+def own(tmp_path):
+    """Writes a robot's file; returns its name."""
+
+    def write(text):
+        path = tmp_path / "mine.xml"
+        path.write_text(text)
+        return str(path)
+
+    return write
+
+
+def steady(_sensed, _wanted, control):
+    control[:] = 1.0
+
+
+def test_a_robot_s_numbers_are_those_of_its_file():
+    [quadrotor] = kinds_of(paper(robot="quadrotor", num_robots=2))
+    assert quadrotor.is_free
+    assert quadrotor.step_s == 0.005
+    airframe = quadrotor.airframe(0.005)
+    assert airframe.mass_kg == pytest.approx(0.5)
+    assert airframe.actuators == ("front", "left", "back", "right")
+    # 6.11e-8 n² N at 1200 and 7800 revolutions a minute.
+    assert airframe.least[0] == pytest.approx(6.11e-8 * 1200**2, rel=1e-3)
+    assert airframe.most[0] == pytest.approx(6.11e-8 * 7800**2, rel=1e-3)
+
+
+def test_kinds_follow_each_other():
+    mission = paper(robot="quadrotor:3,rover:2", num_robots=5)
+    first, second = kinds_of(mission)
+    assert (first.first, first.num_robots) == (0, 3)
+    assert (second.first, second.num_robots) == (3, 2)
+    pilots = make_pilots([first, second], 0.005)
+    assert isinstance(pilots[0], QuadrotorPilot)
+    assert isinstance(pilots[1], RoverPilot)
+    model = compose(mission).compile()
+    assert (model.nq, model.nu) == (3 * 7 + 2 * 3, 3 * 4 + 2 * 3)
+    assert model.body("r4/body").id > model.body("r0/body").id
+
+
+def test_only_the_robot_of_a_file_comes_into_the_scene(own):
+    mission = paper(robot=own(mjcf()), num_robots=3, num_windows=2)
+    [kind] = kinds_of(mission)
+    spec = compose(mission)
+    before = sum(geom.name == "floor" for geom in spec.geoms)
+    assert before == 1
+    assert sum(str(geom.type).endswith("PLANE") for geom in spec.geoms) == 1
+    assert len(spec.actuators) == 3
+    assert kind.step_s == 0.002
+    assert isinstance(steady, Pilot)
+    assert make_pilots([kind], 0.002, steady) == [steady]
+
+
+def test_a_file_needs_a_pilot(own):
+    kinds = kinds_of(paper(robot=own(mjcf()), num_robots=3))
+    with pytest.raises(ValueError, match="needs a pilot, which makes its controls"):
+        make_pilots(kinds, 0.002)
+
+
+def test_an_own_pilot_steers_the_file_among_others(own):
+    mission = paper(robot=f"rover:1,{own(mjcf())}:2", num_robots=3)
+    rover, mine = make_pilots(kinds_of(mission), 0.002, steady)
+    assert isinstance(rover, RoverPilot)
+    assert mine is steady
+
+
+def test_an_own_pilot_for_one_of_two_shipped_kinds_is_refused():
+    kinds = kinds_of(paper(robot="quadrotor:2,rover:2", num_robots=4))
+    with pytest.raises(ValueError, match="each quadrotor or rover here"):
+        make_pilots(kinds, 0.005, steady)
+    with pytest.raises(TypeError, match="a pilot is called with"):
+        make_pilots(kinds[:1], 0.005, lambda _: None)
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ("<mujoco><worldbody>", "not well-formed XML"),
+        (mjcf(body=BODY.replace("<freejoint/>", "")), "neither free nor on a plane"),
+        (mjcf(body=BODY.replace("<freejoint/>", '<joint type="ball"/>')), "neither free nor on"),
+        (mjcf(body=BODY + BODY.replace("base", "b2").replace('"s"', '"t"')), "it has 2 bodies"),
+        (mjcf(actuator=""), "it has no actuator"),
+        (mjcf(option='<option timestep="0.02"/>'), "its timestep must be from 0.0005 to 0.01 s"),
+        (mjcf(actuator=LIFT.replace('"s"', '"gone"')), "gone"),
+        (mjcf(body=BODY.replace('mass="0.2"', 'mass="nan"')), "nan in mass"),
+    ],
+)
+def test_a_file_that_is_no_robot_is_refused_in_a_line(own, text, said):
+    name = own(text)
+    with pytest.raises(ValueError, match=said) as raised:
+        kinds_of(paper(robot=name, num_robots=2))
+    assert str(raised.value).startswith(f"robot {name}: ")
+    assert "\n" not in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("quadroter", "did you mean quadrotor"),
+        ("gone.xml", "robot gone.xml: there is no such file"),
+    ],
+)
+def test_an_unknown_robot_is_refused(name, said):
+    with pytest.raises(ValueError, match=said):
+        kinds_of(paper(robot=name, num_robots=2))
+
+
+def test_a_team_s_pose_has_each_base_where_it_is():
+    kinds = kinds_of(paper(robot="quadrotor:1,rover:1", num_robots=2))
+    position_m = np.array([[1.0, 2.0, 3.0], [4.0, 5.0, 0.125]])
+    half = 0.25 * np.pi
+    attitude = np.array([[1.0, 0.0, 0.0, 0.0], [np.cos(half), 0.0, 0.0, np.sin(half)]])
+    pose = pose_of(kinds, position_m, attitude)
+    np.testing.assert_allclose(pose[:7], [1, 2, 3, 1, 0, 0, 0])
+    np.testing.assert_allclose(pose[7:], [4, 5, 0.5 * np.pi])
+    assert heading_of(attitude[1]) == pytest.approx(0.5 * np.pi)
+
+
+def test_robots_collide_by_their_own_geoms_and_masks():
+    mission = paper(robot="quadrotor", num_robots=2)
+    spec = compose(mission)
+    hulls = [geom for geom in spec.geoms if geom.name.endswith("/hull")]
+    assert [(hull.contype, hull.conaffinity) for hull in hulls] == [(2, 1), (2, 1)]
+    assert spec.geom("r0/core").contype == 0
+    colliding = compose(paper(robot="quadrotor", num_robots=2, collide=True))
+    assert colliding.geom("r0/hull").conaffinity == 3
