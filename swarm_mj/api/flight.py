@@ -146,6 +146,7 @@ def fly_mission(
     numbers["interrupted"] = code != DONE
     numbers["heard_share"] = _heard_share(swarm)
     numbers["strayed"] = _num_strayed(swarm)
+    numbers["crashed"] = _num_crashed(swarm)
     run = Run(
         mission=mission,
         config=flight.config(),
@@ -246,6 +247,12 @@ def _heard_share(swarm: Swarm) -> float:
         is_known = is_known[is_on][:, is_on]
     own = len(is_known)  # a robot knows itself
     return float((np.sum(is_known) - own) / (is_known.size - own))
+
+
+def _num_crashed(swarm: Swarm) -> int | None:
+    """Return how many robots crashed; None where they are points."""
+    has_crashed = swarm.states.has_crashed
+    return None if has_crashed is None else int(np.sum(has_crashed))
 
 
 def _num_strayed(swarm: Swarm) -> int:

@@ -28,6 +28,7 @@ class FlightSummary(dict[str, Any], FlownCosts[float, int, float | None, int | N
     wall_seconds: float  # that the flight took [s]
     interrupted: bool  # whether it ended before its last window
     strayed: int  # robots that are on and out of everyone's range at the end
+    crashed: int | None  # robots with bodies that crashed; None: they are points
     heard_share: float  # pairs of active robots that had heard of each other at the end [1]
 
     def __post_init__(self) -> None:

@@ -96,6 +96,10 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     rows["  bytes each; sent by the team"] = f"{summary.packet_bytes:,}; {rate}"
     rows["decentralised"] = CENTRE if summary.is_centralised else "yes"
     rows |= _task_costs(mission, summary)
+    if summary.crashed is not None:
+        rows["robots crashed"] = (
+            f"{summary.crashed}; off from then on" if summary.crashed else "none"
+        )
     if mission.num_failures:
         rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"
     return rows

@@ -48,6 +48,7 @@ class Moment:
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     now: Float[np.ndarray, "B"]  # t [windows]
     is_active: Bool[np.ndarray, "B N"]
+    has_crashed: Bool[np.ndarray, "B N"] | None  # None: robots are points
     position_m: Float[np.ndarray, "B N D"]
     range_m: float  # of a packet in silence
     is_steady: bool  # whether the window is of the second half
@@ -76,6 +77,13 @@ class Moment:
         if not self.is_last:  # distances of all pairs take as long as a window
             return np.full(len(self.now), np.nan)
         return count_strayed(self.position_m, self.range_m, self.is_active)
+
+    @property
+    def crashed(self) -> Float[np.ndarray, "B"]:
+        """How many robots have crashed; nan where they are points."""
+        if self.has_crashed is None:
+            return np.full(len(self.now), np.nan)
+        return np.sum(self.has_crashed, axis=1, dtype=np.float64)
 
 
 Value = TypeVar("Value")  # one number a mission
@@ -164,6 +172,8 @@ class BatchCosts:
     decay_rate: Float[np.ndarray, "B"] = _of_variance(lambda variance: decay(variance).rate)
     # Robots out of everyone's range at the end.
     strayed: Float[np.ndarray, "B"] = _last(lambda at: at.strayed)
+    # Robots with bodies that crashed; nan: they are points.
+    crashed: Float[np.ndarray, "B"] = _last(lambda at: at.crashed)
     # Requests or broadcasts.
     packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.packets.sent)
     # All that were on the air, responses too.
@@ -265,6 +275,7 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
             timestamp=swarm.buffers.timestamp,
             now=now,
             is_active=is_active,
+            has_crashed=states.has_crashed,
             position_m=states.position_m,
             range_m=mission.range_m,
             is_steady=bool(now[0] > num_early),

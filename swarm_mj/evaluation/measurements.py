@@ -199,6 +199,11 @@ class Measurements:
         """The robots of each mission that were out of everyone's range at its end."""
         return Sample(self._of_flocks(self.costs.strayed))
 
+    @property
+    def crashed(self) -> Sample:
+        """The robots of each mission that crashed; empty where robots are points."""
+        return Sample(self.costs.crashed if self.mission.has_bodies else np.empty(0))
+
     # The paper's own.
 
     def published_mean(self, cost: MissionCost) -> float | None:

@@ -146,6 +146,9 @@ class Result:
     # Flocks: robots of a mission that are out of everyone's range at its end.
     strayed_mean: float | None = later_column(lambda own: own.strayed.mean, older=None)
     strayed_worst: float | None = later_column(lambda own: own.strayed.worst, older=None)
+    # Robots with bodies that crashed in a mission.
+    crashed_mean: float | None = later_column(lambda own: own.crashed.mean, older=None)
+    crashed_worst: float | None = later_column(lambda own: own.crashed.worst, older=None)
 
     # Differences are this policy's minus the baseline's, on the same missions.
     baseline: str = column(lambda own: own.baseline)

@@ -263,7 +263,11 @@ class BodyWorlds:
                 "choose lower gains, or a shorter timestep in its file"
             )
         self.states = replace(
-            states, position_m=position_m, velocity_mps=velocity_mps, attitude=attitude
+            states,
+            position_m=position_m,
+            velocity_mps=velocity_mps,
+            attitude=attitude,
+            has_crashed=self._has_crashed.copy(),
         )
 
 

@@ -22,6 +22,7 @@ class RobotStates:
     velocity_mps: Float[np.ndarray, "B N D"]  # v [m/s]
     is_active: Bool[np.ndarray, "B N"] | None = None  # who observes and transmits; None: all robots
     attitude: Float[np.ndarray, "B N 4"] | None = None  # quaternions of bodies; None: points
+    has_crashed: Bool[np.ndarray, "B N"] | None = None  # bodies that touched anything in flight
     observed_m: Float[np.ndarray, "B N D"] | None = None  # own position, with its error [m]
 
     @property
