@@ -47,6 +47,8 @@ class _Flown(NamedTuple):
     ctrl: Float[np.ndarray, "B n U"]
     push: Float[np.ndarray, "B n V"]  # forces of contacts
     sensors: Float[np.ndarray, "B n S"]
+    wanted: SetPoint
+    has_crashed: Bool[np.ndarray, "B n"]
 
 
 class BodyWorlds:
@@ -91,13 +93,13 @@ class BodyWorlds:
         self._wind = self._batch.expand("opt.wind") if _has_wind(mission) else None
         self._num_steps = num_body_steps(mission, kinds)
         pilots = make_pilots(kinds, mission.window_s / self._num_steps, pilot)
-        self._flown = self._divide(kinds, pilots)
         shape = (num_missions, mission.num_robots)
         self._wanted_mps = np.zeros((*shape, 3))
         self._height_m = np.zeros(shape)
         self._has_crashed = np.zeros(shape, dtype=np.bool_)
         self.reach_m = np.concatenate([np.full(kind.num_robots, kind.reach_m) for kind in kinds])
         self._works: np.ndarray | None = None  # who was not made to fail
+        self._flown = self._divide(kinds, pilots)
         self.states = RobotStates(
             position_m=np.zeros((*shape, 3)),
             velocity_mps=np.zeros((*shape, 3)),
@@ -120,7 +122,9 @@ class BodyWorlds:
                 parts.append(part.reshape(len(array), kind.num_robots, width))
                 starts[a] = after
             robots = slice(kind.first, kind.first + kind.num_robots)
-            found.append(_Flown(kind, pilot, robots, *parts))
+            wanted = SetPoint(self._wanted_mps[:, robots], self._height_m[:, robots])
+            has_crashed = self._has_crashed[:, robots]
+            found.append(_Flown(kind, pilot, robots, *parts, wanted, has_crashed))
         return found
 
     @property
@@ -230,7 +234,7 @@ class BodyWorlds:
             self._batch.step()
             for flown in self._flown:
                 if flown.kind.is_free:
-                    _note_contacts(flown.push, self._has_crashed[:, flown.robots])
+                    _note_contacts(flown.push, flown.has_crashed)
         self._change_gusts()
         self._take_states()
         self._count_active()
@@ -239,10 +243,8 @@ class BodyWorlds:
     def _steer(self) -> None:
         """Let the pilots write all controls; those of robots that crashed are 0."""
         for flown in self._flown:
-            robots = flown.robots
-            wanted = SetPoint(self._wanted_mps[:, robots], self._height_m[:, robots])
-            flown.pilot(_sensed(flown), wanted, flown.ctrl)
-            _stop(self._has_crashed[:, robots], flown.ctrl)
+            flown.pilot(_sensed(flown), flown.wanted, flown.ctrl)
+            _stop(flown.has_crashed, flown.ctrl)
 
     def _take_states(self) -> None:
         """Copy where robots are, in arrays that later steps do not change."""

@@ -5,6 +5,7 @@ import pytest
 
 from swarm_mj import make_policy, paper
 from swarm_mj.physics.bodies import BodyWorlds
+from swarm_mj.policies.registry import POLICIES
 from swarm_mj.simulation.swarm import Swarm
 
 BOX = """
@@ -210,3 +211,25 @@ def test_robots_that_fail_keep_flying_and_those_that_crash_stay_off():
     swarm = flown(mission, [1], 20)
     assert swarm.states.is_active.sum() == 15
     np.testing.assert_allclose(swarm.states.position_m[..., 2], 20.0, atol=0.5)
+
+
+@pytest.mark.parametrize("policy", POLICIES)
+def test_every_policy_flies_robots_with_heights(policy):
+    mission = paper(
+        "random-walk", robot="quadrotor", num_robots=6, range_ratio=0.5, height_range_m=50.0
+    )
+    swarm = flown(mission, [1], 8, policy=policy)
+    assert swarm.buffers.position_m.shape == (1, 6, 6, 3)
+    heard = swarm.buffers.is_known[0] & ~np.eye(6, dtype=bool)
+    believed_m = swarm.buffers.position_m[0, ..., 2]
+    assert np.all(believed_m[heard] >= 15.0)
+
+
+def test_packets_take_the_distance_in_space():
+    """At 240 m on the map a packet decodes within 250 m, but not to a robot 100 m higher."""
+    mission = paper("stationary", robot="quadrotor", num_robots=2)
+    radio = Swarm(mission, [1]).channel
+    sends = np.array([[-1, 1]])
+    for height_m, heard in ((20.0, 0), (120.0, 1)):
+        position_m = np.array([[[0.0, 0.0, 20.0], [240.0, 0.0, height_m]]])
+        assert radio(position_m, sends)[0, 1] == heard
