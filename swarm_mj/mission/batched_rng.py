@@ -31,7 +31,7 @@ class Streams(NamedTuple):
     channel: list[np.random.Generator]
     localisation: list[np.random.Generator]
     sensing: list[np.random.Generator]
-    wind: list[np.random.Generator]
+    bodies: list[np.random.Generator]
 
 
 def streams_of(seeds: Sequence[int]) -> Streams:

@@ -66,6 +66,15 @@ class Bodies(Team):
         high=1000.0,
         source=NEW,
     )
+    robot_spread: float = setting(
+        0.0,
+        "standard deviation of robots' mass and of their motors' force",
+        label="spread of robots",
+        unit="of the model's",
+        low=0.0,
+        high=0.2,
+        source=NEW,
+    )
     wind_mps: float = setting(
         0.0,
         "mean wind, to the east; it pushes bodies, not points",
@@ -138,6 +147,7 @@ class BodiesFields(TypedDict, total=False):
     robot: str
     height_m: float
     height_range_m: float
+    robot_spread: float
     wind_mps: float
     gust_mps: float
     gust_s: float

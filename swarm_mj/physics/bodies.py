@@ -6,12 +6,12 @@ the set point is mirrored, so bodies turn there as well as they can. A body that
 anything has crashed: its rotors stop, and so does its radio.
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from mujoco import batch
 
 from swarm_mj.mission import Mission
@@ -32,6 +32,7 @@ from swarm_mj.physics.worlds import check_accelerations
 from swarm_mj.system.compiled import compiled
 
 FREE_QVEL = 6
+VARIED = ("body_mass", "body_inertia", "actuator_gear")  # from robot to robot
 FARTHEST_M = 1e6  # no robot of a stable model gets so far
 LEAST_HEIGHT_M = 0.5  # below which no set point is
 
@@ -143,13 +144,35 @@ class BodyWorlds:
                 height_m[flown.robots] = flown.kind.base_m
         return height_m
 
-    def start_wind(self, rngs: Sequence[np.random.Generator]) -> None:
-        """Begin the gusts of each mission, from its own generator."""
+    def start(self, rngs: Sequence[np.random.Generator]) -> None:
+        """Draw what is each mission's own, from its generator: how robots differ, and gusts."""
+        if self._mission.robot_spread > 0.0:
+            self._vary(rngs)
         self._gusts = Stream(rngs, normal, (2,)) if self._mission.gust_mps > 0.0 else None
         self._gust_mps = np.zeros((len(rngs), 2))
         if self._gusts is not None:
             self._gust_mps = self._mission.gust_mps * self._gusts.next()
         self._blow()
+
+    def _vary(self, rngs: Sequence[np.random.Generator]) -> None:
+        """Make each robot heavier or lighter, and its motors stronger or weaker, than its model.
+
+        Both factors are normal around 1, cut off at three deviations.
+        """
+        model = self._model
+        mass_kg, inertia_kgm2, gear = (self._batch.expand(name) for name in VARIED)
+        spread = self._mission.robot_spread
+        shape = (2, self._mission.num_robots)
+        drawn = np.clip(np.stack([rng.normal(0.0, 1.0, shape) for rng in rngs]), -3.0, 3.0)
+        heavier, stronger = np.moveaxis(1.0 + spread * drawn, 1, 0)
+        of_body = _owners(model.body(b).name for b in range(model.nbody))
+        of_actuator = _owners(model.actuator(u).name for u in range(model.nu))
+        is_robots = of_body >= 0
+        factor = heavier[:, of_body[is_robots]]
+        mass_kg[:, is_robots] = model.body_mass[is_robots] * factor
+        inertia_kgm2[:, is_robots] = model.body_inertia[is_robots] * factor[..., None]
+        gear[:] = model.actuator_gear * stronger[:, of_actuator, None]
+        self._batch.set_const()
 
     def _blow(self) -> None:
         """Set the wind of the next window: its mean to the east, and the gust of each mission."""
@@ -271,6 +294,15 @@ class BodyWorlds:
             attitude=attitude,
             has_crashed=self._has_crashed.copy(),
         )
+
+
+def _owners(names: Iterable[str]) -> Int[np.ndarray, "K"]:
+    """Return which robot each part of a model is of, by its name; -1 is none."""
+    found = []
+    for name in names:
+        robot, slash, _ = name.partition("/")
+        found.append(int(robot[1:]) if slash and robot[1:].isdecimal() else -1)
+    return np.array(found)
 
 
 def _has_wind(mission: Mission) -> bool:

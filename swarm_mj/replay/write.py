@@ -43,6 +43,7 @@ HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
 ASIDE_SHARE = 0.8 * RING_SHARE  # from a request to its answer, likewise
 RADIUS_SHARE = 1.4 * RING_SHARE  # of a body in 3-D, likewise
+ON_BODY = 0.5  # of a disc's width, where it is on a body that it must not hide
 OBSERVER = 1.3  # times larger
 BODY_HEIGHT = 0.8  # of a body, by its radius
 HALO_M = 2.0  # height of what surrounds a robot that is cut off
@@ -213,7 +214,8 @@ def _draw_robots(out: RerunLog) -> None:
 def _draw_discs(out: RerunLog, radius_m: float, height_m: float) -> None:
     log = out.log
     entity = layers.SCENE_ROBOTS
-    radii = np.full(log.is_on.shape[1], radius_m)
+    share = 1.0 if log.attitude is None else ON_BODY
+    radii = np.full(log.is_on.shape[1], share * radius_m)
     radii[log.ego] *= OBSERVER
     lengths = np.full(len(radii), height_m)
     out.look(entity, rr.Cylinders3D.from_fields(radii=radii, lengths=lengths, fill_mode="solid"))

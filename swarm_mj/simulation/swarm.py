@@ -169,7 +169,7 @@ class Swarm:
         position_m = [starts.positions(b, rng) for b, rng in enumerate(rngs.placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
         if bodies is not None:
-            bodies.start_wind(rngs.wind)
+            bodies.start(rngs.bodies)
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._survivors = draw_survivors(mission, rngs.failures)
         self._noise = None

@@ -193,3 +193,18 @@ def test_top_camera_sees_the_robots_where_they_are(photographed):
         assert np.all(picture[distance_m < 6.0, 1] > 120)
         is_robot |= distance_m < 11.0
     assert np.all(picture[~is_robot, 1] - picture[~is_robot, 0] <= 80)  # the beacons are teal
+
+
+def test_robots_with_bodies_are_shown_as_they_are_turned():
+    environment = make_environment(paper("flocking", robot="quadrotor:3,rover:2", num_robots=5))
+    environment.reset()
+    for _ in range(5):
+        step = environment.step(range(5))
+    physics = environment.physics
+    states = physics.swarm.states
+    assert physics.data.qpos.shape == (3 * 7 + 2 * 3,)
+    np.testing.assert_allclose(
+        physics.data.qpos[:21].reshape(3, 7)[:, :3], states.position_m[0, :3]
+    )
+    np.testing.assert_allclose(physics.data.qpos[:21].reshape(3, 7)[:, 3:], states.attitude[0, :3])
+    assert step.observation["position_m"].shape == (5, 5, 3)

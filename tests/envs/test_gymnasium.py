@@ -30,6 +30,7 @@ SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
         ("Stationary", {}),
         ("RandomWalk", {"features": "paper", "with_parents": True}),
         ("Flocking", {"preset": "reference", "features": "reference"}),
+        ("Flocking", {"robot": "quadrotor"}),
     ],
 )
 @pytest.mark.usefixtures("opengl")

@@ -132,6 +132,7 @@ NOTHING_UNLESS_ASKED = {
     "map_offset_m",
     "position_noise_m",
     "height_range_m",
+    "robot_spread",
     "wind_mps",
     "gust_mps",
     "sensing_miss",

@@ -175,7 +175,7 @@ def test_gusts_have_the_deviation_and_the_time_that_were_asked_for():
     """Of 400 worlds after each of 30 windows, without a mean."""
     mission = paper("stationary", robot="rover", num_robots=2, gust_mps=2.0, gust_s=1.0)
     worlds = BodyWorlds(mission, 400)
-    worlds.start_wind([np.random.default_rng(seed) for seed in range(400)])
+    worlds.start([np.random.default_rng(seed) for seed in range(400)])
     winds = []
     for _ in range(30):
         winds.append(worlds._wind[:, :2].copy())
@@ -185,6 +185,18 @@ def test_gusts_have_the_deviation_and_the_time_that_were_asked_for():
     correlation = np.mean(winds[0] * winds[10]) / np.mean(winds[0] ** 2)
     assert correlation == pytest.approx(np.exp(-1.0), abs=0.15)
     assert np.all(worlds._wind[:, 2] == 0.0)
+
+
+def test_robots_differ_by_their_spread_and_hover_all_the_same():
+    """A heavier one hangs lower, by what its pilot does not know of its weight."""
+    mission = paper("stationary", robot="quadrotor:10,rover:10", num_robots=20, robot_spread=0.05)
+    swarm = flown(mission, [1, 2], 50)
+    height_m = swarm.states.position_m[:, :10, 2]
+    assert swarm.states.is_active is None
+    assert 0.01 < np.std(height_m) < 0.5
+    assert not np.array_equal(height_m[0], height_m[1])
+    alone = flown(mission, [2], 50)
+    np.testing.assert_array_equal(alone.states.position_m[0], swarm.states.position_m[1])
 
 
 def test_heights_are_spread_over_their_range():
