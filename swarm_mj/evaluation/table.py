@@ -81,7 +81,7 @@ def missions_title(result: Result) -> str:
         "controller": result.controller,
         "scene": result.scene,
         "pilot": result.pilot,
-        "robot": None if result.robot == POINT else result.robot,
+        "robot": None if result.robot == POINT else _bodies(result),
         "bit rate": None if result.bit_rate is None else bits_per_second(result.bit_rate),
         "arena": None if result.arena == OPEN else result.arena,
         "prior knowledge": None if result.prior_knowledge == NOTHING else result.prior_knowledge,
@@ -111,6 +111,19 @@ def missions_title(result: Result) -> str:
         f"{result.range_ratio:g},{moves}{result.num_windows} windows of {result.physics} "
         f"physics{fates}, {missions} from seed {result.seed}{own}"
     )
+
+
+def _bodies(result: Result) -> str:
+    """Return the robots' kind, how high they fly, and the wind, in words."""
+    config = config_of(result)
+    said = f"{result.robot} at {config['height_m']:g} m"
+    if config["height_range_m"]:
+        said += f" to {config['height_m'] + config['height_range_m']:g} m"
+    for name, unit in (("wind", "m/s"), ("gust", "m/s"), ("robot_spread", "")):
+        value = config[f"{name}_mps" if unit else name]
+        if value:
+            said += f", {name.replace('robot_', '')} {value:g} {unit}".rstrip()
+    return said
 
 
 def _table(results: Sequence[Result], columns: Sequence[Shown], *, gap: int) -> Table:
