@@ -13,7 +13,7 @@ from swarm_mj.api.live import LiveFlight, viewer_to_keep
 from swarm_mj.api.run import Run
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission, PresetAndFields, make_mission
-from swarm_mj.physics.pilots import Pilot
+from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
@@ -40,7 +40,7 @@ def fly(
     channel: str | Channel | None = None,
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
-    pilot: str | Pilot | None = None,
+    pilot: OwnPilot | None = None,
     features: str | Sequence[str] = (),
     networks: str | Sequence[str] = (),
     **mission_fields: Unpack[PresetAndFields],

@@ -19,6 +19,7 @@ class SceneOptions:
 
     mission: Mission = one_mission()
     scene: str | None = same_as(Components, "scene")
+    pilot: str | None = same_as(Components, "pilot")
     seed: int = setting(1, "of the mission whose start is shown")
     out: Path = setting(Path("scene.xml"), "the file to write")
     force: bool = setting(False, "replace an existing file")
@@ -36,7 +37,7 @@ def run(options: SceneOptions) -> int:
         inputs=files_read(options),
         must_be_new=not options.force,
     )
-    swarm = Swarm(mission, [options.seed], scene=options.scene)
+    swarm = Swarm(mission, [options.seed], scene=options.scene, pilot=options.pilot)
     spec = compose(mission, start=swarm.states, scene=swarm.scene)
     spec.compile()
     write_text(options.out, spec.to_xml())

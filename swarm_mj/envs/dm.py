@@ -18,7 +18,7 @@ from jaxtyping import Int
 
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
-from swarm_mj.physics.pilots import Pilot
+from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.checks import as_array, checked_robots
 from swarm_mj.radio.free_space import Channel
@@ -34,7 +34,7 @@ def make_environment(
     channel: Channel | None = None,
     controller: Controller | None = None,
     scene: Scene | None = None,
-    pilot: Pilot | None = None,
+    pilot: OwnPilot | None = None,
 ) -> control.Environment:
     """Return one mission as an environment of dm_control, and so of dm_env.
 
@@ -69,7 +69,8 @@ def make_environment(
 class SwarmPhysics(mujoco.Physics):
     """A swarm of one mission, as dm_control's `named`, cameras and viewer know a physics.
 
-    Its qpos and qvel are p and v (IV-A). A copy of it is a still, to be looked at only.
+    Its qpos and qvel are p and v (IV-A), or those of bodies. A copy of it is a still, to be looked
+    at only.
     """
 
     def __init__(self, swarm: Swarm, seed: int) -> None:

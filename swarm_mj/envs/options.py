@@ -15,7 +15,7 @@ from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission, Task, TaskAndFields, make_mission
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.arenas import arena_of
-from swarm_mj.physics.pilots import Pilot
+from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.policies.gnn.feature_sets import is_own_set, load_features
 from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
@@ -56,7 +56,7 @@ class BatchOptions(TaskAndFields, total=False):
     channel: Channel | str | None
     controller: Controller | str | None
     scene: Scene | str | None
-    pilot: Pilot | str | None
+    pilot: OwnPilot | None
 
 
 def make_batch(
@@ -70,7 +70,7 @@ def make_batch(
     channel: Channel | str | None = None,
     controller: Controller | str | None = None,
     scene: Scene | str | None = None,
-    pilot: Pilot | str | None = None,
+    pilot: OwnPilot | None = None,
     **fields: Unpack[TaskAndFields],
 ) -> MissionBatch:
     """Return missions that have not begun, by the options that all environments share.

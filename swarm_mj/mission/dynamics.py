@@ -23,7 +23,7 @@ class Dynamics:
     )
     collide: bool = setting(
         False,
-        "robots bounce off each other, too, in contact physics",
+        "robots touch each other, too: points bounce, quadrotors crash",
         label="robots collide",
         source=NEW,
     )

@@ -6,23 +6,28 @@ the set point is mirrored, so bodies turn there as well as they can. A body that
 anything has crashed: its rotors stop, and so does its radio.
 """
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from mujoco import batch
+from mujoco._enums import mjtBias, mjtDyn
+from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.mission.batched_rng import Started, Stream, normal
 from swarm_mj.mission.faults import MIN_SURVIVORS
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
 from swarm_mj.physics.robots import (
     FREE_QPOS,
+    FREE_QVEL,
     PLANAR_QPOS,
+    OwnPilot,
     RobotKind,
+    collides,
     kinds_of,
     make_pilots,
 )
@@ -30,9 +35,10 @@ from swarm_mj.physics.scene import Scene, compiled_scene, compose, num_body_step
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import check_accelerations
 from swarm_mj.system.compiled import compiled
+from swarm_mj.system.user_code import is_ours
 
-FREE_QVEL = 6
-VARIED = ("body_mass", "body_inertia", "actuator_gear")  # from robot to robot
+LAGS = [int(mjtDyn.mjDYN_FILTER), int(mjtDyn.mjDYN_FILTEREXACT)]  # a control, a while later
+VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robot
 FARTHEST_M = 1e6  # no robot of a stable model gets so far
 LEAST_HEIGHT_M = 0.5  # below which no set point is
 
@@ -50,6 +56,7 @@ class _Flown(NamedTuple):
     sensors: Float[np.ndarray, "B n S"]
     wanted: SetPoint
     has_crashed: Bool[np.ndarray, "B n"]
+    is_trusted: bool  # the pilot is the package's own
 
 
 class BodyWorlds:
@@ -68,7 +75,7 @@ class BodyWorlds:
         num_missions: int,
         *,
         scene: Scene | None = None,
-        pilot: Pilot | str | None = None,
+        pilot: OwnPilot | None = None,
         num_threads: int = 1,
     ) -> None:
         """Compile the scene and make B worlds.
@@ -85,8 +92,10 @@ class BodyWorlds:
             TypeError: The pilot is not called as one is.
         """
         self._mission = mission
-        kinds = kinds_of(mission)
+        self._kinds = kinds = kinds_of(mission)
         self._model = compiled_scene(compose(mission, scene=scene), scene)
+        if scene is not None:
+            _check_bodies(self._model, kinds)
         found = obstacles_of(self._model)
         self.obstacles = found if len(found.kind) > 0 else None
         self._batch = batch.Batch(self._model, num_missions, num_threads)
@@ -123,9 +132,9 @@ class BodyWorlds:
                 parts.append(part.reshape(len(array), kind.num_robots, width))
                 starts[a] = after
             robots = slice(kind.first, kind.first + kind.num_robots)
-            wanted = SetPoint(self._wanted_mps[:, robots], self._height_m[:, robots])
-            has_crashed = self._has_crashed[:, robots]
-            found.append(_Flown(kind, pilot, robots, *parts, wanted, has_crashed))
+            wanted = SetPoint(_seen(self._wanted_mps[:, robots]), _seen(self._height_m[:, robots]))
+            own = wanted, self._has_crashed[:, robots], is_ours(pilot)
+            found.append(_Flown(kind, pilot, robots, *parts, *own))
         return found
 
     @property
@@ -148,6 +157,9 @@ class BodyWorlds:
         """Draw what is each mission's own, from its generator: how robots differ, and gusts."""
         if self._mission.robot_spread > 0.0:
             self._vary(rngs)
+        for flown in self._flown:
+            if isinstance(flown.pilot, Started):
+                flown.pilot.start(flown.kind.num_robots, rngs)
         self._gusts = Stream(rngs, normal, (2,)) if self._mission.gust_mps > 0.0 else None
         self._gust_mps = np.zeros((len(rngs), 2))
         if self._gusts is not None:
@@ -160,19 +172,28 @@ class BodyWorlds:
         Both factors are normal around 1, cut off at three deviations.
         """
         model = self._model
-        mass_kg, inertia_kgm2, gear = (self._batch.expand(name) for name in VARIED)
+        mass_kg, inertia_kgm2, gain = (self._batch.expand(name) for name in VARIED)
         spread = self._mission.robot_spread
         shape = (2, self._mission.num_robots)
         drawn = np.clip(np.stack([rng.normal(0.0, 1.0, shape) for rng in rngs]), -3.0, 3.0)
         heavier, stronger = np.moveaxis(1.0 + spread * drawn, 1, 0)
-        of_body = _owners(model.body(b).name for b in range(model.nbody))
-        of_actuator = _owners(model.actuator(u).name for u in range(model.nu))
-        is_robots = of_body >= 0
-        factor = heavier[:, of_body[is_robots]]
-        mass_kg[:, is_robots] = model.body_mass[is_robots] * factor
-        inertia_kgm2[:, is_robots] = model.body_inertia[is_robots] * factor[..., None]
-        gear[:] = model.actuator_gear * stronger[:, of_actuator, None]
+        # In a scene robots come first, one after the other.
+        of_body = self._owners([kind.model.nbody - 1 for kind in self._kinds])
+        of_actuator = self._owners([kind.model.nu for kind in self._kinds])
+        bodies = slice(1, 1 + len(of_body))
+        mass_kg[:, bodies] = model.body_mass[bodies] * heavier[:, of_body]
+        inertia_kgm2[:, bodies] = model.body_inertia[bodies] * heavier[:, of_body, None]
+        is_motor = model.actuator_biastype == mjtBias.mjBIAS_NONE  # whose gain is its force
+        own_gain = model.actuator_gainprm[is_motor]
+        gain[:, is_motor] = own_gain * stronger[:, of_actuator[is_motor], None]
         self._batch.set_const()
+
+    def _owners(self, numbers: Sequence[int]) -> Int[np.ndarray, "K"]:
+        """Return the robot of each part, where a robot of each kind has so many."""
+        by_robot = []
+        for kind, number in zip(self._kinds, numbers, strict=True):
+            by_robot += [number] * kind.num_robots
+        return np.repeat(np.arange(len(by_robot)), by_robot)
 
     def _blow(self) -> None:
         """Set the wind of the next window: its mean to the east, and the gust of each mission."""
@@ -197,6 +218,7 @@ class BodyWorlds:
         self._height_m[:] = position_m[..., 2]
         self._has_crashed[:] = False
         self._works = None
+        self.states = replace(self.states, is_active=None)
         for flown in self._flown:
             its_m = position_m[:, flown.robots]
             its_mps = velocity_mps[:, flown.robots]
@@ -218,8 +240,11 @@ class BodyWorlds:
         """Let what follows its control by a lag begin where the control is: rotors turn already."""
         model = self._model
         control = self._batch.bind("ctrl")
-        for u in np.flatnonzero(model.actuator_actnum == 1).tolist():
-            self._act[:, model.actuator_actadr[u]] = control[:, u]
+        for u in np.flatnonzero(np.isin(model.actuator_dyntype, LAGS)).tolist():
+            begun = control[:, u]
+            if model.actuator_ctrllimited[u]:
+                begun = np.clip(begun, *model.actuator_ctrlrange[u])
+            self._act[:, model.actuator_actadr[u]] = begun
 
     def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
         """Make these the robots that work from now on; the others keep moving."""
@@ -227,15 +252,19 @@ class BodyWorlds:
         self._count_active()
 
     def _count_active(self) -> None:
-        """Take robots that crashed for failed, as long as some are left in each mission."""
+        """Take robots that crashed for failed; two stay on whatever happens, those of least number.
+
+        An age of information needs a pair.
+        """
         if self._works is None and not np.any(self._has_crashed):
             return
-        is_active = ~self._has_crashed if self._works is None else self._works & ~self._has_crashed
-        is_empty = np.sum(is_active, axis=1) < MIN_SURVIVORS
-        before = self.states.is_active
-        if before is None:
-            before = np.ones_like(is_active) if self._works is None else self._works
-        is_active = np.where(is_empty[:, None], before, is_active)
+        works = np.ones_like(self._has_crashed) if self._works is None else self._works
+        is_active = works & ~self._has_crashed
+        for b in np.flatnonzero(np.sum(is_active, axis=1) < MIN_SURVIVORS).tolist():
+            # First those that fly, then those that only crashed.
+            order = np.argsort(~is_active[b], kind="stable")
+            chosen = [i for i in order.tolist() if works[b, i]][:MIN_SURVIVORS]
+            is_active[b, chosen] = True
         self.states = replace(self.states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N 3"]) -> RobotStates:
@@ -267,6 +296,11 @@ class BodyWorlds:
         """Let the pilots write all controls; those of robots that crashed are 0."""
         for flown in self._flown:
             flown.pilot(_sensed(flown), flown.wanted, flown.ctrl)
+            if not flown.is_trusted and not np.all(np.isfinite(flown.ctrl)):
+                raise ValueError(
+                    f"the pilot of {flown.kind.name} must write finite controls, not "
+                    f"{flown.ctrl[~np.isfinite(flown.ctrl)][0]:g}"
+                )
             _stop(flown.has_crashed, flown.ctrl)
 
     def _take_states(self) -> None:
@@ -296,17 +330,33 @@ class BodyWorlds:
         )
 
 
-def _owners(names: Iterable[str]) -> Int[np.ndarray, "K"]:
-    """Return which robot each part of a model is of, by its name; -1 is none."""
-    found = []
-    for name in names:
-        robot, slash, _ = name.partition("/")
-        found.append(int(robot[1:]) if slash and robot[1:].isdecimal() else -1)
-    return np.array(found)
+def _check_bodies(model: MjModel, kinds: Sequence[RobotKind]) -> None:
+    """Raise ValueError if a scene made robots heavier or lighter, tied them, or let them pass."""
+    mass_kg: list[float] = []
+    num_colliding = 0
+    for kind in kinds:
+        mass_kg += kind.model.body_mass[1:].tolist() * kind.num_robots
+        num_colliding += kind.num_robots * int(np.sum(collides(kind.model)))
+    last = len(mass_kg)
+    is_of_robots = (model.geom_bodyid > 0) & (model.geom_bodyid <= last)
+    is_tied = model.neq + model.ntendon > 0
+    is_other = not np.allclose(model.body_mass[1 : last + 1], mass_kg)
+    if is_tied or is_other or np.sum(collides(model) & is_of_robots) != num_colliding:
+        raise ValueError(
+            "a scene must leave the robots, but changed their mass or what collides of them, or "
+            "tied them; add static geoms to the world instead"
+        )
 
 
 def _has_wind(mission: Mission) -> bool:
     return mission.wind_mps > 0.0 or mission.gust_mps > 0.0
+
+
+def _seen(array: np.ndarray) -> np.ndarray:
+    """Return a view that cannot be written: pilots read what MuJoCo and the set points are."""
+    view = array[:]
+    view.flags.writeable = False
+    return view
 
 
 def _sensed(flown: _Flown) -> Sensed:
@@ -315,10 +365,10 @@ def _sensed(flown: _Flown) -> Sensed:
     qvel = flown.qvel
     if flown.kind.is_free:
         return Sensed(
-            position_m=qpos[..., :3],
-            attitude=qpos[..., 3:FREE_QPOS],
-            velocity_mps=qvel[..., :3],
-            turn_rate_rps=qvel[..., 3:FREE_QVEL],
+            position_m=_seen(qpos[..., :3]),
+            attitude=_seen(qpos[..., 3:FREE_QPOS]),
+            velocity_mps=_seen(qvel[..., :3]),
+            turn_rate_rps=_seen(qvel[..., 3:FREE_QVEL]),
             sensors=flown.sensors,
         )
     shape = qpos.shape[:2]
@@ -357,7 +407,10 @@ def _move_set_points(
                 if axis < 2 and abs(p) > wall_m and p * v > 0.0:
                     v = -v
                 wanted_mps[b, i, axis] = v
-            height_m[b, i] = max(height_m[b, i] + wanted_mps[b, i, 2] * dt_s, LEAST_HEIGHT_M)
+            height_m[b, i] += wanted_mps[b, i, 2] * dt_s
+            if height_m[b, i] < LEAST_HEIGHT_M:  # it may not sink further
+                height_m[b, i] = LEAST_HEIGHT_M
+                wanted_mps[b, i, 2] = max(wanted_mps[b, i, 2], 0.0)
 
 
 @compiled(makes_arrays=False)

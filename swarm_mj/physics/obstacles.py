@@ -68,7 +68,7 @@ def idle_obstacles(model: MjModel, mission: Mission) -> dict[str, str]:
         off_m = np.abs(found.centre_m[o] - [0.0, 0.0, ROBOT_HEIGHT_M]) - half_m
         if np.any(off_m[:2] > reach_m):
             idle[name] = f"outside the area of {2 * reach_m:.0f} m by {2 * reach_m:.0f} m"
-        elif off_m[2] > ROBOT_RADIUS_M:
+        elif off_m[2] > ROBOT_RADIUS_M and not mission.has_bodies:
             side = "above" if found.centre_m[o, 2] > ROBOT_HEIGHT_M else "below"
             idle[name] = f"{side} the robots, which are {ROBOT_HEIGHT_M:g} m above the floor"
     return idle

@@ -31,7 +31,7 @@ class Airframe:
     """A robot's model, as a pilot is made for it."""
 
     mass_kg: float  # of the whole robot
-    inertia_kgm2: Float[np.ndarray, "3"]  # of its base, about the axes of its frame
+    inertia_kgm2: Float[np.ndarray, "3"]  # of the whole, about its base's axes; inf: none
     actuators: tuple[str, ...]  # the U controls' names
     least: Float[np.ndarray, "U"]  # of each control; -inf without a limit
     most: Float[np.ndarray, "U"]  # of each control; inf without a limit

@@ -8,14 +8,16 @@ the scene; its `timestep` is kept.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from mujoco._enums import mjtJoint
+from mujoco._functions import mj_forward, mj_fullM
 from mujoco._specs import MjsBody, MjSpec
-from mujoco._structs import MjModel
+from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arena_files import read_mjcf, take_over_settings
@@ -27,8 +29,10 @@ from swarm_mj.system.user_code import make
 LEAST_STEP_S = 0.0005
 MOST_STEP_S = 0.01
 FREE_QPOS = 7  # of a free base: a place and a quaternion
+FREE_QVEL = 6  # of a free base: velocity and turn rate
 PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
 
+OwnPilot = Pilot | type | str  # an object, a class that is made for an airframe, or its name
 CALLED_WITH = ("sensed", "wanted", "control")  # a pilot
 
 
@@ -70,17 +74,22 @@ class RobotKind:
         """Height of the base over the floor, in the model's own pose."""
         return float(self.model.body_pos[1, 2])
 
-    @property
+    @cached_property
     def reach_m(self) -> float:
         """Radius of the smallest sphere around the base that holds all that collides."""
-        reach_m = 0.0
-        for g in range(self.model.ngeom):
-            body = int(self.model.geom_bodyid[g])
-            collides = self.model.geom_contype[g] or self.model.geom_conaffinity[g]
-            if body > 0 and collides:
-                off_m = float(np.linalg.norm(self.model.geom_pos[g]))
-                reach_m = max(reach_m, off_m + float(self.model.geom_rbound[g]))
-        return reach_m
+        data = rest_pose(self)
+        off_m = np.linalg.norm(data.geom_xpos - data.xpos[1], axis=1) + self.model.geom_rbound
+        return float(np.max(off_m[collides(self.model)]))
+
+    def _inertia_kgm2(self) -> Float[np.ndarray, "3"]:
+        """Return the inertia of the whole robot about the axes of its base, joints at rest."""
+        model = self.model
+        full = np.zeros((model.nv, model.nv))
+        mj_fullM(model, rest_pose(self), full)
+        diagonal = np.diag(full)
+        if self.is_free:
+            return diagonal[3:FREE_QVEL].copy()
+        return np.array([np.inf, np.inf, diagonal[2]])  # it turns about the vertical alone
 
     def airframe(self, step_s: float) -> Airframe:
         """Return the model as a pilot is made for it, at this step of MuJoCo's."""
@@ -89,13 +98,28 @@ class RobotKind:
         least, most = model.actuator_ctrlrange.T
         return Airframe(
             mass_kg=float(model.body_subtreemass[1]),
-            inertia_kgm2=model.body_inertia[1].copy(),
+            inertia_kgm2=self._inertia_kgm2(),
             actuators=tuple(model.actuator(u).name for u in range(model.nu)),
             least=np.where(is_limited, least, -np.inf),
             most=np.where(is_limited, most, np.inf),
             sensors=tuple(model.sensor(s).name for s in range(model.nsensor)),
             step_s=step_s,
         )
+
+
+def collides(model: MjModel) -> Bool[np.ndarray, "G"]:
+    """Return which geoms are of the robot, not its surroundings, and collide."""
+    has_mask = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return has_mask & (model.geom_bodyid > 0)
+
+
+def rest_pose(kind: RobotKind) -> MjData:
+    """Return a robot whose base is level at the origin, or on its plane, all other joints at 0."""
+    data = MjData(kind.model)
+    if kind.is_free:
+        data.qpos[:FREE_QPOS] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    mj_forward(kind.model, data)
+    return data
 
 
 def kinds_of(mission: Mission) -> list[RobotKind]:
@@ -116,15 +140,15 @@ def kinds_of(mission: Mission) -> list[RobotKind]:
 
 
 def make_pilots(
-    kinds: Sequence[RobotKind], step_s: float, own: Pilot | str | None = None
+    kinds: Sequence[RobotKind], step_s: float, own: OwnPilot | None = None
 ) -> list[Pilot]:
     """Return the pilot of each kind.
 
     Args:
         kinds: Of a team.
         step_s: MuJoCo's step [s].
-        own: A user's, or its name, `module:Name`. It steers the robots whose model is a file;
-            without such, those of the one kind that there is.
+        own: A user's, its class, or its name, `module:Name`. It steers the robots whose model is a
+            file; without such, those of the one kind that there is.
 
     Returns:
         The pilots, in the order of kinds.
@@ -157,9 +181,13 @@ def make_pilots(
     return pilots
 
 
-def _own_pilot(own: Pilot | str, airframe: Airframe) -> Pilot:
+def _own_pilot(own: OwnPilot, airframe: Airframe) -> Pilot:
     """Return a user's pilot; a class is made for the airframe."""
-    made: Any = make("pilot", own, airframe) if isinstance(own, str) else own
+    made: Any = own
+    if isinstance(own, str):
+        made = make("pilot", own, airframe)
+    elif isinstance(own, type):
+        made = own(airframe)
     check_callable("pilot", made, CALLED_WITH)
     return made
 
@@ -228,25 +256,51 @@ def _base(spec: MjSpec) -> MjsBody:
 
 def _check(kind: str, spec: MjSpec, model: MjModel) -> None:
     """Raise ValueError for a model that cannot be one robot of a team."""
-    said = ""
-    step_s = model.opt.timestep
+    said = _fault_of_base(spec, model) or _fault_of_parts(model)
+    if said:
+        raise ValueError(f"robot {kind}: {said}")
+
+
+def _fault_of_base(spec: MjSpec, model: MjModel) -> str:
+    """Return what is wrong with where a model is and how it can move; nothing if it is right."""
     bases = spec.worldbody.bodies
     if len(bases) != 1:
-        said = f"it has {len(bases)} bodies in the world, but a robot has one, and others within it"
-    elif not _has_base(model):
-        said = (
+        return f"it has {len(bases)} bodies in the world, but a robot has one, and others within it"
+    if not _has_base(model):
+        return (
             f"body {bases[0].name or 'without a name'} is neither free nor on a plane; give it "
             "<freejoint/>, or slides along x and y and then a hinge about z"
         )
-    elif model.nu == 0:
-        said = "it has no actuator, so nothing could drive it"
-    elif not LEAST_STEP_S <= step_s <= MOST_STEP_S:
+    if not _is_at_origin(model):
+        return (
+            "a base on a plane must begin at x = y = 0, level and facing x, its joints without pos "
+            "and ref"
+        )
+    return ""
+
+
+def _fault_of_parts(model: MjModel) -> str:
+    """Return what is wrong with what a model has; nothing if it is right."""
+    step_s = model.opt.timestep
+    if model.nu == 0:
+        return "it has no actuator, so nothing could drive it"
+    if not np.any(collides(model)):
+        return "it has no geom that collides, so nothing could stop it; give one contype 1"
+    if not LEAST_STEP_S <= step_s <= MOST_STEP_S:
         limits = f"from {LEAST_STEP_S:g} to {MOST_STEP_S:g} s"
-        said = f"its timestep must be {limits}, not {step_s:g}; give <option timestep/>"
-    elif model.neq + model.ntendon > 0:
-        said = "it has equalities or tendons, which are not supported"
-    if said:
-        raise ValueError(f"robot {kind}: {said}")
+        return f"its timestep must be {limits}, not {step_s:g}; give <option timestep/>"
+    if model.neq + model.ntendon > 0:
+        return "it has equalities or tendons, which are not supported"
+    return ""
+
+
+def _is_at_origin(model: MjModel) -> bool:
+    """Return whether a planar base has the coordinates that its joints have; a free one may not."""
+    if int(model.jnt_type[0]) == int(mjtJoint.mjJNT_FREE):
+        return True
+    is_level = np.allclose(model.body_quat[1], [1.0, 0.0, 0.0, 0.0])
+    is_central = not np.any(model.body_pos[1, :2]) and not np.any(model.jnt_pos[:3])
+    return is_level and is_central and not np.any(model.qpos0[:PLANAR_QPOS])
 
 
 def _has_base(model: MjModel) -> bool:

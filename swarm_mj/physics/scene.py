@@ -9,14 +9,14 @@ from xml.etree import ElementTree
 import numpy as np
 from jaxtyping import Float
 from mujoco._enums import mjtDisableBit
-from mujoco._specs import MjsBody, MjsGeom, MjSpec
+from mujoco._specs import MjsGeom, MjSpec
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.obstacles import OBSTACLE_GROUP
 from swarm_mj.physics.pilots import GRAVITY_MPS2
-from swarm_mj.physics.robots import RobotKind, add_robots, heading_of, kinds_of, pose_of
+from swarm_mj.physics.robots import RobotKind, add_robots, kinds_of, pose_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.arguments import name_of
 from swarm_mj.system.packages import asset
@@ -346,33 +346,25 @@ def _place_bodies(
 ) -> None:
     """Put robots with bodies at their start: as the model's own pose, and as a keyframe."""
     kinds = kinds_of(mission)
+    bases = spec.worldbody.bodies  # robots come first, in their order
     qvel = []
     for kind in kinds:
         for i in range(kind.first, kind.first + kind.num_robots):
-            base = _base_of(spec, i)
+            base = bases[i]
             own_mps = np.zeros(kind.model.nv)
             if kind.is_free:
                 base.pos = position_m[i]
+                base.quat = attitude[i]
                 own_mps[:3] = velocity_mps[i]
             else:
                 x, y = position_m[i, :2].tolist()
                 base.pos = [x, y, kind.base_m]
-                heading = heading_of(attitude[i])
-                for joint, ref in zip(base.joints, (x, y, heading), strict=True):
-                    joint.ref = ref
+                for joint, ref in zip(base.joints[:2], (x, y), strict=True):
+                    joint.ref = ref  # headings are in the keyframe: turned, it would slide aslant
                 own_mps[:2] = velocity_mps[i, :2]
-            base.quat = attitude[i]
             qvel.append(own_mps)
     qpos = pose_of(kinds, position_m, attitude)
     spec.add_key(name="start", qpos=qpos, qvel=np.concatenate(qvel))
-
-
-def _base_of(spec: MjSpec, i: int) -> MjsBody:
-    """Return the body of robot i that moves in the world."""
-    for body in spec.worldbody.bodies:
-        if body.name.startswith(f"r{i}/"):
-            return body
-    raise ValueError(f"a scene must leave the robots, but took away r{i}")
 
 
 def _scale_arena(spec: MjSpec, mission: Mission) -> None:

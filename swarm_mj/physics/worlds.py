@@ -9,6 +9,7 @@ Positions come from MuJoCo's step; only the mirror at a wall writes them. Two mo
 - `contact`: forces at 10 ms steps, and joint limits that turn the velocity round at a wall.
 """
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -26,7 +27,7 @@ from swarm_mj.physics.scene import (
     num_substeps,
     timestep_s,
 )
-from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.compiled import compiled
 
 
@@ -65,8 +66,15 @@ class Physics:
         self._ctrl = self._batch.bind("ctrl").reshape(shape)
         self._wall_m = mission.half_side_m if mission.has_walls else np.inf
         self._rests = scene is None  # no scene can push robots at rest
+        self.reach_m = np.full(mission.num_robots, ROBOT_RADIUS_M)  # of hulls
         # True states, in arrays that later steps do not change.
         self.states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
+
+    def start(self, rngs: Sequence[np.random.Generator]) -> None:
+        """Draw nothing: points are all alike."""
+
+    def draw_heights_m(self, _rng: np.random.Generator) -> None:
+        """Return no heights, which points do not have."""
 
     def place(
         self, position_m: Float[np.ndarray, "B N D"], velocity_mps: Float[np.ndarray, "B N D"]

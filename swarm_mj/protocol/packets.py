@@ -68,7 +68,7 @@ def packet_of(mission: Mission, payload: tuple[PacketField, ...] = ()) -> Packet
     entry = (
         age("age (T)"),
         position("position (M)", mission, POSITION_BITS),
-        _symmetric("velocity (M)", VELOCITY_BITS, mission.max_velocity_mps, "m/s"),
+        _symmetric("velocity (M)", mission, VELOCITY_BITS, mission.max_velocity_mps, "m/s"),
         identity("parent (P)", mission),
     )
     return Packet(header=header, entry=entry, num_entries=mission.num_robots, payload=payload)
@@ -91,7 +91,8 @@ def position(name: str, mission: Mission, bits: int) -> PacketField:
     duration_s = mission.num_windows * mission.window_s
     outside_m = 0.0 if mission.has_walls else mission.max_velocity_mps * duration_s
     outside_m += MAX_STDS * mission.position_noise_m
-    return _symmetric(name, bits, mission.half_side_m + outside_m, "m")
+    highest_m = mission.height_m + mission.height_range_m if mission.has_bodies else 0.0
+    return _symmetric(name, mission, bits, max(mission.half_side_m, highest_m) + outside_m, "m")
 
 
 def bits_for(count: int) -> int:
@@ -104,11 +105,11 @@ def times(field: PacketField, count: int) -> PacketField:
     return replace(field, count=field.count * count)
 
 
-def _symmetric(name: str, bits: int, most: float, unit: str) -> PacketField:
-    """Return two axes from -most to most; 0 is a code, so that robots at rest are seen to rest."""
+def _symmetric(name: str, mission: Mission, bits: int, most: float, unit: str) -> PacketField:
+    """Return all axes from -most to most; 0 is a code, so that robots at rest are seen to rest."""
     step = most / (2 ** (bits - 1) - 1)
     low = -step * 2 ** (bits - 1)
-    return PacketField(name=name, bits=bits, count=2, low=low, step=step, unit=unit)
+    return PacketField(name=name, bits=bits, count=mission.num_axes, low=low, step=step, unit=unit)
 
 
 def slot_bytes(mission: Mission, taken_s: float = 0.0) -> int | None:

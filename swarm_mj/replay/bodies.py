@@ -8,10 +8,9 @@ from collections.abc import Iterable
 
 import numpy as np
 import rerun as rr
-from mujoco._functions import mj_kinematics
-from mujoco._structs import MjData, MjModel
+from mujoco._structs import MjModel
 
-from swarm_mj.physics.robots import RobotKind, kinds_of
+from swarm_mj.physics.robots import RobotKind, kinds_of, rest_pose
 from swarm_mj.replay import layers
 from swarm_mj.replay.layer_kinds import Entity
 from swarm_mj.replay.rerun_log import RerunLog
@@ -50,11 +49,8 @@ def draw_bodies(out: RerunLog, radius_m: float) -> None:
 def _geoms(kind: RobotKind) -> dict[str, rr.AsComponents]:
     """Return the shapes that are seen of a robot in its own frame, by the names of its geoms."""
     model = kind.model
-    data = MjData(model)
-    if kind.is_free:
-        data.qpos[:3] = 0.0
-    mj_kinematics(model, data)
-    data.geom_xpos[:, 2] -= 0.0 if kind.is_free else kind.base_m
+    data = rest_pose(kind)
+    data.geom_xpos[:, 2] -= data.xpos[1, 2]  # of a base on a plane, which is above the floor
     found: dict[str, rr.AsComponents] = {}
     for g in _seen(model):
         name = model.geom(g).name or f"geom{g}"

@@ -26,7 +26,7 @@ MAX_SQUARES = 60  # across the ground; more would be too small to see
 GRID_M = 0.2  # above the floor
 FILL_SHARE = 0.008  # of half the map's width: between the lines that fill an obstacle
 MIRROR = np.diag([1.0, -1.0, 1.0])  # rerun's 2D views have y down, the map has it up
-PLANE = 0  # as MuJoCo numbers it
+PLANE_GEOM = 0  # as MuJoCo numbers it
 FLOOR_M = 0.5  # half the thickness of a drawn plane: rerun has solids only
 FillMode: TypeAlias = Literal["solid", "transparentfillmajorwireframe"]
 GLASS: FillMode = "transparentfillmajorwireframe"  # obstacles hide no robot
@@ -199,7 +199,7 @@ def _box_around(model: MjModel, data: MjData, g: int, fill_mode: FillMode) -> rr
     # In the geom's own axes: a mesh's box need not be centred on its place.
     middle_m, half_m = np.split(model.geom_aabb[g], 2)
     centre_m = place_m + rotation @ middle_m
-    if model.geom_type[g] == PLANE:
+    if model.geom_type[g] == PLANE_GEOM:
         half_x_m, half_y_m, _ = model.geom_size[g]
         # A size of 0 means without end.
         half_m = np.array([half_x_m or FAR_M, half_y_m or FAR_M, FLOOR_M])

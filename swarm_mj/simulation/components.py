@@ -9,8 +9,8 @@ from typing import Any, TypedDict
 
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
-from swarm_mj.physics.pilots import Pilot
 from swarm_mj.physics.robots import CALLED_WITH as CALLED_AS_PILOT
+from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.free_space import Channel, VaryingChannel
@@ -37,7 +37,7 @@ class GivenParts(TypedDict, total=False):
     channel: Channel | VaryingChannel | str
     controller: Controller | str
     scene: Scene | str
-    pilot: Pilot | str
+    pilot: OwnPilot
 
 
 def _files(component: object) -> list[Path]:
@@ -83,7 +83,8 @@ class Components:
     def __post_init__(self) -> None:
         for kind, component in self.given.items():
             # A channel that varies from slot to slot is asked for each slot's, not called.
-            if not isinstance(component, str) and not hasattr(component, "at"):
+            is_class = kind == "pilot" and isinstance(component, type)  # made for its robots
+            if not isinstance(component, str) and not hasattr(component, "at") and not is_class:
                 check_callable(kind, component, CALLED_WITH[kind])
 
     @property
@@ -123,8 +124,8 @@ class Components:
             The components; what was an object is the same object.
 
         Raises:
-            ValueError: One cannot be loaded or made, is not called as its kind is, or is a channel
-                that takes the place of effects that the mission asks for.
+            ValueError: One cannot be loaded or made, is not called as its kind is, is a channel
+                that takes the place of effects that the mission asks for, or a pilot of points.
         """
         made = self
         for kind, name in self.given.items():

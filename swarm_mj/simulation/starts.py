@@ -10,7 +10,8 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.physics.bodies import BodyWorlds
-from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
+from swarm_mj.physics.state import ROBOT_HEIGHT_M
+from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.policy import Policy, check_parameters
 from swarm_mj.protocol.packets import Packet
 from swarm_mj.radio.composed import ComposedChannel
@@ -25,16 +26,14 @@ class Starts:
     """Where the robots of missions may begin."""
 
     mission: Mission
-    obstacles: Obstacles | None
+    worlds: Physics | BodyWorlds
     channel: ComposedChannel | None  # that says who is connected; None: distances say it
-    bodies: BodyWorlds | None = None  # None: robots are points
 
     def positions(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N D"]:
         """Draw where mission b's robots begin, connected under their channel where it can say."""
         mission = self.mission
         channel = self.channel
-        has_obstacles = self.obstacles is not None
-        height_m = None if self.bodies is None else self.bodies.draw_heights_m(rng)
+        has_obstacles = self.worlds.obstacles is not None
         return connected_positions(
             num_robots=mission.num_robots,
             half_side_m=mission.half_side_m,
@@ -43,19 +42,18 @@ class Starts:
             largest_part_at=partial(channel.largest_part, mission=b) if channel else None,
             is_blocked_at=self.is_blocked if has_obstacles or mission.collide else None,
             keeps_largest=has_obstacles or mission.num_robots > MAX_DRAWN_AT_ONCE,
-            height_m=height_m,
+            height_m=self.worlds.draw_heights_m(rng),
         )
 
     def is_blocked(self, position_m: Float[np.ndarray, "N D"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
         is_blocked = np.zeros(len(position_m), dtype=bool)
         height_m = np.full(len(position_m), ROBOT_HEIGHT_M)
-        reach_m = np.full(len(position_m), ROBOT_RADIUS_M)
-        if self.bodies is not None:
+        if position_m.shape[1] > PLANE:
             height_m = position_m[:, PLANE].copy()
-            reach_m = self.bodies.reach_m
-        if self.obstacles is not None:
-            is_blocked = blocked(position_m, height_m, reach_m, self.obstacles)
+        reach_m = self.worlds.reach_m
+        if self.worlds.obstacles is not None:
+            is_blocked = blocked(position_m, height_m, reach_m, self.worlds.obstacles)
         if self.mission.collide:
             apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
             needed_m = reach_m[:, np.newaxis] + reach_m

@@ -13,7 +13,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, check_seeds, streams_of
 from swarm_mj.mission.placement import draw_survivors
 from swarm_mj.physics.bodies import BodyWorlds
-from swarm_mj.physics.pilots import Pilot
+from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import Physics
@@ -45,7 +45,7 @@ def physics_of(
     num_missions: int,
     *,
     scene: Scene | None,
-    pilot: Pilot | str | None,
+    pilot: OwnPilot | None,
     num_threads: int,
 ) -> Physics | BodyWorlds:
     """Return the worlds of a mission's robots, be they points or bodies."""
@@ -100,7 +100,7 @@ class Swarm:
         channel: str | Channel | VaryingChannel | None = None,
         controller: str | Controller | None = None,
         scene: str | Scene | None = None,
-        pilot: str | Pilot | None = None,
+        pilot: OwnPilot | None = None,
         num_threads: int = 1,
     ) -> None:
         """Place the robots and start all missions, each from its own seed."""
@@ -164,12 +164,10 @@ class Swarm:
         """Draw where the robots begin, how fast, who will fail, and errors of localisation."""
         mission = self.mission
         rngs = self._rngs
-        bodies = self._physics if isinstance(self._physics, BodyWorlds) else None
-        starts = Starts(mission, self._physics.obstacles, self.truth.channel, bodies)
+        starts = Starts(mission, self._physics, self.truth.channel)
         position_m = [starts.positions(b, rng) for b, rng in enumerate(rngs.placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
-        if bodies is not None:
-            bodies.start(rngs.bodies)
+        self._physics.start(rngs.bodies)
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._survivors = draw_survivors(mission, rngs.failures)
         self._noise = None
@@ -287,7 +285,7 @@ class Swarm:
 
         Raises:
             ValueError: If the controller's accelerations are not one finite vector per robot, [B N
-                2].
+                D].
         """
         wanted_mps2 = self.controller(self._read_only, self._states_for(self._controller_is_ours))
         states = self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))

@@ -6,6 +6,7 @@ import pytest
 from swarm_mj import make_policy, paper
 from swarm_mj.physics.bodies import BodyWorlds
 from swarm_mj.policies.registry import POLICIES
+from swarm_mj.protocol.packets import packet_of
 from swarm_mj.simulation.swarm import Swarm
 
 BOX = """
@@ -87,10 +88,32 @@ def _airframe_of(mission):
 
 def test_two_robots_stay_on_whoever_crashes(box):
     """An age needs a pair of robots, so the last that crash together count as before."""
-    mission = paper("stationary", robot=box, num_robots=3, height_m=1.0)
+    mission = paper("stationary", robot=box, num_robots=4, height_m=1.0)
     swarm = flown(mission, [1], 20, pilot=Resting())
     assert np.all(swarm.states.position_m[0, :, 2] < 0.5)
-    assert swarm.states.is_active.sum() >= 2
+    assert swarm.states.has_crashed.all()
+    assert swarm.states.is_active.tolist() == [[True, True, False, False]]
+
+
+def test_what_failed_never_counts_again():
+    """Of three that work one crashes: the others stay, and none of those that failed."""
+    worlds = BodyWorlds(paper("stationary", robot="quadrotor", num_robots=5), 1)
+    worlds.deactivate(np.array([[False, True, True, True, False]]))
+    worlds._has_crashed[0, 1] = True
+    worlds._count_active()
+    assert worlds.states.is_active.tolist() == [[False, False, True, True, False]]
+    worlds._has_crashed[0, 2] = True
+    worlds._count_active()
+    assert worlds.states.is_active.tolist() == [[False, True, False, True, False]]
+
+
+def test_robots_that_crashed_fly_again_in_the_next_mission(box):
+    mission = paper("stationary", robot=box, num_robots=3, height_m=1.0)
+    swarm = flown(mission, [1], 20, pilot=Resting())
+    assert swarm.states.is_active is not None
+    swarm.restart([2])
+    assert swarm.states.is_active is None
+    assert not swarm.states.has_crashed.any()
 
 
 def test_a_pilot_is_named_too(box, tmp_path, monkeypatch):
@@ -120,6 +143,78 @@ def test_a_pilot_whose_robots_fly_apart_is_named(box):
     mission = paper("stationary", robot=box, num_robots=2)
     with pytest.raises(ValueError, match="not stable under its pilot"):
         flown(mission, [1], 2, pilot=Violent())
+
+
+def test_a_pilot_that_writes_no_numbers_is_named(box):
+    class Lost:
+        def __call__(self, _sensed, _wanted, control):
+            control[:] = np.nan
+
+    mission = paper("stationary", robot=box, num_robots=2)
+    with pytest.raises(ValueError, match="must write finite controls, not nan"):
+        flown(mission, [1], 2, pilot=Lost())
+
+
+def test_a_pilot_is_a_class_too_and_begins_anew_with_every_mission(box):
+    started = []
+
+    class Counting(Hovering):
+        def start(self, num_robots, rngs):
+            started.append((num_robots, len(rngs)))
+
+        def __call__(self, sensed, wanted, control):
+            assert not sensed.position_m.flags.writeable
+            assert not wanted.velocity_mps.flags.writeable
+            super().__call__(sensed, wanted, control)
+
+    swarm = flown(paper("stationary", robot=box, num_robots=3), [1, 2], 1, pilot=Counting)
+    swarm.restart([3, 4])
+    assert started == [(3, 2), (3, 2)]
+
+
+def test_a_scene_must_leave_the_robots():
+    def heavier(spec, _mission):
+        spec.body("r0/body").add_geom(size=[0.1, 0.0, 0.0], mass=3.0)
+
+    def harmless(spec, _mission):
+        spec.geom("r1/hull").contype = 0
+        spec.geom("r1/hull").conaffinity = 0
+
+    for scene in (heavier, harmless):
+        with pytest.raises(ValueError, match="a scene must leave the robots"):
+            Swarm(paper("flocking", robot="quadrotor", num_robots=3), [1], scene=scene)
+
+
+def test_a_set_point_sinks_no_further_than_half_a_metre():
+    """A controller that asks for 1 m/s downwards for ever lands nobody."""
+
+    def sink(_buffers, states):
+        wanted = np.zeros_like(states.velocity_mps)
+        wanted[..., 2] = -1.0 - states.velocity_mps[..., 2]
+        return wanted
+
+    mission = paper("flocking", robot="quadrotor", num_robots=3, height_m=3.0)
+    swarm = flown(mission, [1], 150, controller=sink)
+    assert swarm.states.is_active is None
+    np.testing.assert_allclose(swarm.states.position_m[..., 2], 0.5, atol=0.1)
+
+
+def test_quadrotors_that_touch_crash_only_if_they_collide():
+    for collide in (False, True):
+        mission = paper("stationary", robot="quadrotor", num_robots=4, collide=collide)
+        worlds = BodyWorlds(mission, 1)
+        worlds.start([np.random.default_rng(0)])
+        position_m = np.array([[[0.0, 0, 20], [0.3, 0, 20], [50, 0, 20], [-50, 0, 20]]])
+        worlds.place(position_m, np.zeros_like(position_m))
+        states = worlds.step(np.zeros_like(position_m))
+        assert states.has_crashed.tolist() == [[collide, collide, False, False]]
+
+
+def test_packets_of_bodies_hold_a_third_axis():
+    """24 bits more for each robot: 16 of its place, 8 of its velocity."""
+    flat = packet_of(paper(num_robots=40))
+    tall = packet_of(paper(num_robots=40, robot="quadrotor"))
+    assert tall.num_bytes - flat.num_bytes == 40 * 3
 
 
 @pytest.mark.parametrize("task", ["stationary", "random-walk", "flocking"])

@@ -40,8 +40,6 @@ def test_a_quadrotor_hovers_where_it_began():
     position_m, velocity_mps = course(flown, (0.0, 0.0, 0.0), 50)
     np.testing.assert_allclose(position_m[-1], [-100.0, 0.0, HEIGHT_M], atol=1e-6)
     np.testing.assert_allclose(velocity_mps, 0.0, atol=1e-6)
-    lift_n = flown.pose[0].shape  # 7 coordinates each
-    assert lift_n == (1, 14)
 
 
 def test_it_reaches_a_velocity_as_its_pilot_s_poles_say():
@@ -96,7 +94,11 @@ def test_its_steady_speed_in_a_wind_is_the_set_point_less_what_drag_takes():
     course(calm, (0.0, 0.0, 0.0), 60)
     _, velocity_mps = course(windy, (0.0, 0.0, 0.0), 60)
     drift = velocity_mps[-1, 0]
-    assert 0.02 < drift < 0.5
+    # MuJoCo's drag of the box with this inertia, whose sides are 0.219, 0.219 and 0.088 m.
+    side_m = np.sqrt(6.0 * 4e-3 / 0.5)
+    flat_m = np.sqrt(6.0 * (2 * 2.32e-3 - 4e-3) / 0.5)
+    drag_mps2 = 0.5 * 1.204 * side_m * flat_m * (5.0 - drift) ** 2 / 0.5
+    assert drift == pytest.approx(drag_mps2 / 2.5, rel=0.3)
     assert calm.states.velocity_mps[0, 0, 0] == pytest.approx(0.0, abs=1e-6)
 
 

@@ -1,3 +1,4 @@
+import mujoco
 import numpy as np
 import pytest
 
@@ -5,8 +6,14 @@ from swarm_mj import paper
 from swarm_mj.physics.pilots import Pilot, QuadrotorPilot, RoverPilot
 from swarm_mj.physics.robots import heading_of, kinds_of, make_pilots, pose_of
 from swarm_mj.physics.scene import compose
+from swarm_mj.simulation.swarm import Swarm
 
 BODY = '<body name="base"><freejoint/><geom size="0.1" mass="0.2"/><site name="s"/></body>'
+PLANAR = (
+    '<body name="base" pos="0 0 0.1"><joint name="x" type="slide" axis="1 0 0"/>'
+    '<joint name="y" type="slide" axis="0 1 0"/><joint name="h" type="hinge" axis="0 0 1"/>'
+    '<geom size="0.1" mass="0.2"/><site name="s"/></body>'
+)
 LIFT = '<actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>'
 
 
@@ -98,6 +105,8 @@ def test_an_own_pilot_for_one_of_two_shipped_kinds_is_refused():
         (mjcf(body=BODY.replace("<freejoint/>", '<joint type="ball"/>')), "neither free nor on"),
         (mjcf(body=BODY + BODY.replace("base", "b2").replace('"s"', '"t"')), "it has 2 bodies"),
         (mjcf(actuator=""), "it has no actuator"),
+        (mjcf(body=BODY.replace("<geom", '<geom contype="0" conaffinity="0"')), "that collides"),
+        (mjcf(body=PLANAR.replace('pos="0 0 0.1"', 'pos="1 0 0.1"')), "must begin at x = y = 0"),
         (mjcf(option='<option timestep="0.02"/>'), "its timestep must be from 0.0005 to 0.01 s"),
         (mjcf(actuator=LIFT.replace('"s"', '"gone"')), "gone"),
         (mjcf(body=BODY.replace('mass="0.2"', 'mass="nan"')), "nan in mass"),
@@ -132,6 +141,33 @@ def test_a_team_s_pose_has_each_base_where_it_is():
     np.testing.assert_allclose(pose[:7], [1, 2, 3, 1, 0, 0, 0])
     np.testing.assert_allclose(pose[7:], [4, 5, 0.5 * np.pi])
     assert heading_of(attitude[1]) == pytest.approx(0.5 * np.pi)
+
+
+def test_the_inertia_is_that_of_the_whole_robot(own):
+    """A mass of 0.1 kg at 0.5 m along x adds 0.025 kg m² about y and z, and none about x."""
+    far = '<body pos="0.5 0 0"><geom size="0.001" mass="0.1"/></body></body>'
+    inertia = {}
+    for name, body in (("alone", BODY), ("with", BODY.replace("</body>", far))):
+        [kind] = kinds_of(paper(robot=own(mjcf(body=body)), num_robots=2))
+        inertia[name] = kind.airframe(0.002).inertia_kgm2
+        reach_m = kind.reach_m
+    np.testing.assert_allclose(inertia["with"] - inertia["alone"], [0, 0.025, 0.025], atol=1e-6)
+    assert reach_m == pytest.approx(0.501)
+
+
+def test_a_scene_s_keyframe_has_each_robot_where_it_begins():
+    mission = paper("random-walk", robot="quadrotor:2,rover:2", num_robots=4, range_ratio=1.0)
+    swarm = Swarm(mission, [1])
+    model = compose(mission, start=swarm.states).compile()
+    data = mujoco.MjData(model)
+    for load in (lambda: None, lambda: mujoco.mj_resetDataKeyframe(model, data, 0)):
+        load()
+        mujoco.mj_forward(model, data)
+        place_m = np.array([data.body(f"r{i}/body").xpos for i in range(4)])
+        np.testing.assert_allclose(place_m, swarm.states.position_m[0], atol=1e-6)
+    heading = data.body("r2/body").xmat.reshape(3, 3)[:2, 0]
+    velocity_mps = swarm.states.velocity_mps[0, 2, :2]
+    np.testing.assert_allclose(heading, velocity_mps / np.linalg.norm(velocity_mps), atol=1e-6)
 
 
 def test_robots_collide_by_their_own_geoms_and_masks():

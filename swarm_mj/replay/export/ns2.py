@@ -39,10 +39,12 @@ def _about(flown: FlownWindows) -> Iterator[str]:
 
 
 def _start(flown: FlownWindows) -> Iterator[str]:
+    heights_m = flown.footage.height_m  # ns-2's robots stay at the height where they begin
     for robot, (x_m, y_m) in enumerate(flown.footage.position_m[0].tolist()):
         yield f"$node_({robot}) set X_ {x_m:.{DIGITS}f}"
         yield f"$node_({robot}) set Y_ {y_m:.{DIGITS}f}"
-        yield f"$node_({robot}) set Z_ 0.0"
+        up_m = 0.0 if heights_m is None else heights_m[0, robot]
+        yield f"$node_({robot}) set Z_ {up_m:.{DIGITS}f}" if up_m else f"$node_({robot}) set Z_ 0.0"
 
 
 def _legs(flown: FlownWindows, row: int) -> Iterator[str]:
