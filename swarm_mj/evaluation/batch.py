@@ -83,7 +83,7 @@ class Moment:
         """How many robots have crashed; nan where they are points."""
         if self.has_crashed is None:
             return np.full(len(self.now), np.nan)
-        return np.sum(self.has_crashed, axis=1, dtype=np.float64)
+        return np.sum(self.has_crashed, axis=1).astype(float)
 
 
 Value = TypeVar("Value")  # one number a mission

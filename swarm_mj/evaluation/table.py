@@ -116,13 +116,17 @@ def missions_title(result: Result) -> str:
 def _bodies(result: Result) -> str:
     """Return the robots' kind, how high they fly, and the wind, in words."""
     config = config_of(result)
-    said = f"{result.robot} at {config['height_m']:g} m"
-    if config["height_range_m"]:
-        said += f" to {config['height_m'] + config['height_range_m']:g} m"
-    for name, unit in (("wind", "m/s"), ("gust", "m/s"), ("robot_spread", "")):
-        value = config[f"{name}_mps" if unit else name]
+    said = result.robot
+    for name, words in (
+        ("height_m", "at {:g} m"),
+        ("height_range_m", "to {:g} m higher"),
+        ("wind_mps", "wind {:g} m/s"),
+        ("gust_mps", "gusts {:g} m/s"),
+        ("robot_spread", "spread {:g}"),
+    ):
+        value = config.get(name)
         if value:
-            said += f", {name.replace('robot_', '')} {value:g} {unit}".rstrip()
+            said += f", {words.format(value)}"
     return said
 
 

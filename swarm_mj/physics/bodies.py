@@ -133,8 +133,21 @@ class BodyWorlds:
                 starts[a] = after
             robots = slice(kind.first, kind.first + kind.num_robots)
             wanted = SetPoint(_seen(self._wanted_mps[:, robots]), _seen(self._height_m[:, robots]))
-            own = wanted, self._has_crashed[:, robots], is_ours(pilot)
-            found.append(_Flown(kind, pilot, robots, *parts, *own))
+            qpos, qvel, ctrl, push, sensors = parts
+            flown = _Flown(
+                kind=kind,
+                pilot=pilot,
+                robots=robots,
+                qpos=qpos,
+                qvel=qvel,
+                ctrl=ctrl,
+                push=push,
+                sensors=sensors,
+                wanted=wanted,
+                has_crashed=self._has_crashed[:, robots],
+                is_trusted=is_ours(pilot),
+            )
+            found.append(flown)
         return found
 
     @property

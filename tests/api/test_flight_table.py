@@ -32,12 +32,13 @@ def summary(**numbers):
     return Summary(**(dict.fromkeys(names, NAN) | given | {"num_windows": 100}))
 
 
-def shown(policy_name, task, its, strayed=0):
+def shown(policy_name, task, its, strayed=0, crashed=None):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=7)
     policy = make_policy(policy_name, mission)
     numbers = flight_numbers(mission, policy, its)
     ended = {"wall_seconds": 1.5, "interrupted": False, "heard_share": 0.254, "strayed": strayed}
+    ended["crashed"] = crashed
     rows = flight_rows(mission, FlightSummary(**numbers, **ended))
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
@@ -109,6 +110,15 @@ def test_robots_that_nobody_reaches_any_more_have_a_row():
     row = "robots out of everyone's range"
     flock = summary(**BROADCAST)
     assert shown("tdma", "flocking", flock, strayed=2)[0][row] == "2 at the end"
+
+
+def test_only_bodies_crash():
+    """Points have no row of it."""
+    row = "robots crashed"
+    walk = summary(**BROADCAST)
+    assert row not in shown("tdma", "random-walk", walk)[0]
+    assert shown("tdma", "random-walk", walk, crashed=0)[0][row] == "none"
+    assert shown("tdma", "random-walk", walk, crashed=3)[0][row] == "3; off from then on"
     assert row not in shown("tdma", "flocking", flock)[0]
 
 

@@ -33,6 +33,7 @@ def costs(aoi, **overrides):
         "agreed_window": NONE,
         "decay_rate": NONE,
         "strayed": np.zeros(3),
+        "crashed": np.full(3, np.nan),
         "packets_sent": np.zeros(3),
         "packets_transmitted": np.zeros(3),
         "packets_delivered": NONE,

@@ -39,6 +39,7 @@ def costs(aoi, **overrides):
         "agreed_window": [None] * n,
         "decay_rate": [None] * n,
         "strayed": [0.0] * n,
+        "crashed": [None] * n,
         "packets_sent": [1000] * n,
         "packets_transmitted": [1500] * n,
         "packets_delivered": [250] * n,
