@@ -188,6 +188,7 @@ figures: setup
 	$(BIN)/python training/impairments_figure.py
 	$(BIN)/python training/readme_figure.py
 	$(BIN)/python training/large_teams_figure.py
+	$(BIN)/python training/rewards_figure.py
 	$(BIN)/python tools/diagrams.py
 
 reproduce: setup
