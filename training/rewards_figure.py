@@ -16,7 +16,7 @@ from typing import Any, cast
 import numpy as np
 from jaxtyping import Float
 from matplotlib.figure import Figure
-from matplotlib.ticker import ScalarFormatter
+from matplotlib.ticker import LogLocator, NullLocator
 from scipy.stats import mannwhitneyu
 
 from swarm_mj.cli import script
@@ -121,7 +121,9 @@ def draw(trained: Sequence[Trained]) -> Figure:
                 line = {"color": look.colour, "marker": look.marker, "markersize": 4.0}
                 axes.plot(each.decisions, median, label=look.label, **line)
             axes.set_yscale("log")
-            axes.yaxis.set_major_formatter(ScalarFormatter())
+            axes.yaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+            axes.yaxis.set_minor_locator(NullLocator())
+            axes.yaxis.set_major_formatter("{x:g}")
             axes.set_title(cost.label)
         variances.set_xlabel("team decisions")
         ages.legend(frameon=False, loc="upper left")
