@@ -151,8 +151,8 @@ format: $(DEV)
 	$(BIN)/ruff check --fix .
 
 # The paper's methods with two of ours, and ours with the paper's simplest.
-PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "one GNN" "GNN generalized from 0.25" \
-  "GNN trained at each size" "GNN generalized from 40" \
+PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN on turns" "linear GNN on turns" \
+  "one GNN" "GNN generalized from 0.25" "GNN trained at each size" "GNN generalized from 40" \
   "GNN trained on AoI" "GNN trained on velocity variance"
 OURS := planner "planner --payload none" sotdma age-gain-csma gnn spatial-tdma tdma gossip csma aloha random-flooding \
   greedy-oracle lookahead-oracle
@@ -188,6 +188,7 @@ figures: setup
 	$(BIN)/python training/impairments_figure.py
 	$(BIN)/python training/readme_figure.py
 	$(BIN)/python training/large_teams_figure.py
+	$(BIN)/python training/rewards_figure.py
 	$(BIN)/python tools/diagrams.py
 
 reproduce: setup

@@ -11,7 +11,7 @@ from swarm_mj.system.reading import read_file, read_plain
 MOST_BYTES = 10_000_000  # of a file that is read
 ROOT = Path(__file__).resolve().parent.parent
 PAPERS = ("fig3", "fig6", "fig5", "fig4")
-FIGURES = (*PAPERS, "one", "tutorial", "recipes")  # one network for all; those of docs/training.md
+FIGURES = (*PAPERS, "one", "rewards", "tutorial", "recipes")
 SCALES = ("quick", "full")
 
 

@@ -58,6 +58,8 @@ OTHERS = {
     "GNN generalized from 40": replace(VARIANT, label="GNN, from 40"),
     BETTER: replace(GNN, label="the paper's GNN"),
     "one GNN": replace(REWARDED, label="one GNN for all"),
+    "GNN on turns": replace(REWARDED, label="GNN, turns"),
+    "linear GNN on turns": Look(label="GNN, linear, turns", colour="#7a7a00", marker="h"),
     "GNN with shared reward": REWARDED,
     "GNN with credit per robot": replace(REWARDED, label="GNN, own credit"),
     "GNN trained on AoI": replace(GNN, label="GNN, on AoI"),

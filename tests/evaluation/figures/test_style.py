@@ -27,7 +27,7 @@ BLINDNESS = {
     "deutan": [[0.29275, 0.70725, 0.0], [0.29275, 0.70725, 0.0], [-0.02234, 0.02234, 1.0]],
 }
 # Kinds of GNN look like others of other figures, or like the GNN itself.
-ALIKE = ("GNN t", "GNN g", "linear GNN", "one GNN", "GNN with shared")
+ALIKE = ("GNN t", "GNN g", "GNN on", "linear GNN", "one GNN", "GNN with shared")
 
 
 # It is grey, as what has no look is, so that it stands back in the figures that have room for it.
