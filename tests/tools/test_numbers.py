@@ -27,7 +27,12 @@ AT_ONE_POINT = {QUICK / f"fig{number}.csv" for number in (4, 5, 6)}
 ONE_ELSEWHERE = {RESULTS / "one-reference.csv"}
 ONE_IN_CITY = {RESULTS / "one-city.csv"}
 RECIPES = {QUICK / "recipes.csv"}
-NEWER = (CONVERGING, LOOKAHEAD, INDEX, ONE, AT_ONE_POINT, ONE_ELSEWHERE, ONE_IN_CITY, RECIPES)
+HOPS = {QUICK / "fig3.csv"}
+REWARDS = {QUICK / "rewards.csv"}
+NEWER = (
+    *(CONVERGING, LOOKAHEAD, INDEX, ONE, AT_ONE_POINT, ONE_ELSEWHERE, ONE_IN_CITY, RECIPES),
+    *(HOPS, REWARDS),
+)
 
 
 def test_the_pages_have_the_numbers_of_the_results():
