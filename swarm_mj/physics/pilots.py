@@ -35,6 +35,7 @@ class Airframe:
     actuators: tuple[str, ...]  # the U controls' names
     least: Float[np.ndarray, "U"]  # of each control; -inf without a limit
     most: Float[np.ndarray, "U"]  # of each control; inf without a limit
+    thrust: Float[np.ndarray, "U 6"]  # force and torque on the base of a control of 1; 0: no motor
     sensors: tuple[str, ...]  # the names of the model's sensors, in the order of their numbers
     step_s: float  # MuJoCo's step
 
@@ -81,23 +82,27 @@ class QuadrotorPilot:
     rad/s turns the body, one of 2 to 3 rad/s the velocity: slower than the rotors' lag, and faster
     than news.
 
-    The four actuators must be rotors in the order front, left, back and right of a cross, front and
-    back turning one way.
+    It flies any model with four rotors whose lifts and torques are independent, whatever their
+    places: what a rotor does to the base is the model's own.
     """
 
-    ARM_M = 0.175  # assets/quadrotor.xml, as the next one
-    TORQUE_PER_LIFT_M = 0.02455
     MOST_TILT = math.tan(math.radians(40.0))  # of the horizontal over the vertical force
     LEAST_LIFT = 0.3  # of gravity: a body that falls freely has no force to turn
 
     def __init__(self, airframe: Airframe) -> None:
-        """Prepare for this airframe; raise ValueError for one without four rotors."""
-        if len(airframe.actuators) != 4:
-            raise ValueError(f"its pilot needs four rotors, not {len(airframe.actuators)}")
+        """Prepare for this airframe; raise ValueError for one without four rotors that steer it."""
+        num_rotors = len(airframe.actuators)
+        effects = airframe.thrust[:, 2:].T  # lift, and torque about the body's axes
+        if num_rotors != 4 or np.linalg.matrix_rank(effects) < 4:
+            raise ValueError(
+                f"its pilot needs four rotors that lift, roll, pitch and turn it, not {num_rotors} "
+                "actuators that do less"
+            )
+        self._shares = np.linalg.inv(effects)  # of each rotor in a lift and the three torques
         self._mass_kg = airframe.mass_kg
         self._inertia_kgm2 = airframe.inertia_kgm2
-        self._least = float(airframe.least[0])
-        self._most = float(airframe.most[0])
+        self._least = airframe.least
+        self._most = airframe.most
 
     def __call__(
         self, sensed: Sensed, wanted: SetPoint, control: Float[np.ndarray, "B n U"], /
@@ -112,12 +117,11 @@ class QuadrotorPilot:
             height_m=wanted.height_m,
             mass_kg=self._mass_kg,
             inertia_kgm2=self._inertia_kgm2,
-            arm_m=self.ARM_M,
-            torque_per_lift_m=self.TORQUE_PER_LIFT_M,
+            shares=self._shares,
             most_tilt=self.MOST_TILT,
             least_lift=self.LEAST_LIFT,
-            least_n=self._least,
-            most_n=self._most,
+            least=self._least,
+            most=self._most,
             control=control,
         )
 
@@ -179,12 +183,11 @@ def _steer_quadrotors(
     height_m: Float[np.ndarray, "B n"],
     mass_kg: float,
     inertia_kgm2: Float[np.ndarray, "3"],
-    arm_m: float,
-    torque_per_lift_m: float,
+    shares: Float[np.ndarray, "4 4"],
     most_tilt: float,
     least_lift: float,
-    least_n: float,
-    most_n: float,
+    least: Float[np.ndarray, "4"],
+    most: Float[np.ndarray, "4"],
     control: Float[np.ndarray, "B n U"],
 ) -> None:
     for b in range(control.shape[0]):
@@ -223,14 +226,11 @@ def _steer_quadrotors(
             roll_nm = inertia_kgm2[0] * (_TILT_GAIN * roll - _TURN_GAIN * rates[0])
             pitch_nm = inertia_kgm2[1] * (_TILT_GAIN * pitch - _TURN_GAIN * rates[1])
             yaw_nm = -inertia_kgm2[2] * (_YAW_GAIN * yaw + _YAW_RATE_GAIN * rates[2])
-            each_n = 0.25 * lift_n
-            rolling_n = 0.5 * roll_nm / arm_m  # left lifts, right lowers
-            pitching_n = 0.5 * pitch_nm / arm_m  # back lifts, front lowers
-            yawing_n = 0.25 * yaw_nm / torque_per_lift_m  # left and right turn the body to the left
-            control[b, i, 0] = min(max(each_n - pitching_n - yawing_n, least_n), most_n)
-            control[b, i, 1] = min(max(each_n + rolling_n + yawing_n, least_n), most_n)
-            control[b, i, 2] = min(max(each_n + pitching_n - yawing_n, least_n), most_n)
-            control[b, i, 3] = min(max(each_n - rolling_n + yawing_n, least_n), most_n)
+            for u in range(4):
+                share = shares[u]
+                wanted = share[0] * lift_n + share[1] * roll_nm
+                wanted += share[2] * pitch_nm + share[3] * yaw_nm
+                control[b, i, u] = min(max(wanted, least[u]), most[u])
 
 
 # Of the rover, per second.

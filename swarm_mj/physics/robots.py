@@ -14,8 +14,8 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
-from mujoco._enums import mjtJoint
-from mujoco._functions import mj_forward, mj_fullM
+from mujoco._enums import mjtBias, mjtJoint
+from mujoco._functions import mj_forward, mj_fullM, mju_sparse2dense
 from mujoco._specs import MjsBody, MjSpec
 from mujoco._structs import MjData, MjModel
 
@@ -81,6 +81,21 @@ class RobotKind:
         off_m = np.linalg.norm(data.geom_xpos - data.xpos[1], axis=1) + self.model.geom_rbound
         return float(np.max(off_m[collides(self.model)]))
 
+    def _thrust(self) -> Float[np.ndarray, "U 6"]:
+        """Return the force and torque on the base, in its axes, of a control of 1 of each motor."""
+        model = self.model
+        data = rest_pose(self)
+        is_motor = model.actuator_biastype == mjtBias.mjBIAS_NONE
+        moment = np.zeros((model.nu, model.nv))
+        mju_sparse2dense(
+            moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
+        )
+        effect = np.zeros((model.nu, FREE_QVEL))
+        width = min(FREE_QVEL, model.nv) if self.is_free else 0
+        effect[:, :width] = moment[:, :width] * model.actuator_gainprm[:, :1]
+        effect[~is_motor] = 0.0
+        return effect
+
     def _inertia_kgm2(self) -> Float[np.ndarray, "3"]:
         """Return the inertia of the whole robot about the axes of its base, joints at rest."""
         model = self.model
@@ -102,6 +117,7 @@ class RobotKind:
             actuators=tuple(model.actuator(u).name for u in range(model.nu)),
             least=np.where(is_limited, least, -np.inf),
             most=np.where(is_limited, most, np.inf),
+            thrust=self._thrust(),
             sensors=tuple(model.sensor(s).name for s in range(model.nsensor)),
             step_s=step_s,
         )

@@ -7,14 +7,15 @@ from swarm_mj import paper
 from swarm_mj.physics.bodies import BodyWorlds
 from swarm_mj.physics.pilots import GRAVITY_MPS2, Airframe, QuadrotorPilot, RoverPilot
 from swarm_mj.physics.robots import kinds_of
+from swarm_mj.system.packages import asset
 
 HEIGHT_M = 20.0
 
 
-def worlds(robot, num_robots=2, **fields):
+def worlds(robot, num_robots=2, pilot=None, **fields):
     """Worlds of one mission of robots that stand still, far apart."""
     mission = paper("random-walk", robot=robot, num_robots=num_robots, **fields)
-    flown = BodyWorlds(mission, 1)
+    flown = BodyWorlds(mission, 1, pilot=pilot)
     flown.start([np.random.default_rng(0)])
     position_m = np.zeros((1, num_robots, 3))
     position_m[0, :, 0] = 50.0 * np.arange(num_robots) - 100.0
@@ -142,9 +143,42 @@ def test_a_rover_turns_in_the_circle_that_its_speed_and_turn_rate_make():
     np.testing.assert_allclose(velocity_mps[-1], [0.0, 1.0, 0.0], atol=0.02)
 
 
+def test_rotors_push_at_their_places():
+    """A control of 1 N lifts by 1 N; front and left tip the body about y and x, by their arms."""
+    [kind] = kinds_of(paper(robot="quadrotor", num_robots=2))
+    front, left, back, right = kind.airframe(0.005).thrust
+    np.testing.assert_allclose(front, [0, 0, 1, 0, -0.175, -0.02455], atol=1e-12)
+    np.testing.assert_allclose(left, [0, 0, 1, 0.175, 0, 0.02455], atol=1e-12)
+    np.testing.assert_allclose(front + back, [0, 0, 2, 0, 0, -0.0491], atol=1e-12)
+    np.testing.assert_allclose(left + right, [0, 0, 2, 0, 0, 0.0491], atol=1e-12)
+
+
+def test_the_pilot_flies_a_quadrotor_of_another_size_and_layout(tmp_path):
+    """Four times as heavy, with arms twice as long, and rotors at the corners in another order."""
+    text = asset("quadrotor.xml").read_text()
+    for old, new in (
+        ('mass="0.5" diaginertia="2.32e-3 2.32e-3 4e-3"', 'mass="2" diaginertia="0.03 0.03 0.05"'),
+        ('ctrlrange="0.088 3.717"', 'ctrlrange="0 15"'),
+        ('name="front" pos="0.175 0 0"', 'name="front" pos="-0.25 0.25 0"'),
+        ('name="left" pos="0 0.175 0"', 'name="left" pos="-0.25 -0.25 0"'),
+        ('name="back" pos="-0.175 0 0"', 'name="back" pos="0.25 -0.25 0"'),
+        ('name="right" pos="0 -0.175 0"', 'name="right" pos="0.25 0.25 0"'),
+    ):
+        assert old in text
+        text = text.replace(old, new)
+    path = tmp_path / "large.xml"
+    path.write_text(text)
+    flown = worlds(str(path), pilot="swarm_mj.physics.pilots:QuadrotorPilot")
+    _, velocity_mps = course(flown, (10.0, 0.0, 0.0), 40)
+    np.testing.assert_allclose(velocity_mps[-1], [1.0, 0.0, 0.0], atol=0.02)
+    assert flown.states.position_m[0, 0, 2] == pytest.approx(HEIGHT_M, abs=0.05)
+
+
 def test_pilots_refuse_other_robots():
     [rover] = kinds_of(paper(robot="rover", num_robots=2))
-    with pytest.raises(ValueError, match="needs four rotors, not 3"):
+    with pytest.raises(
+        ValueError, match="needs four rotors that lift, roll, pitch and turn it, not 3"
+    ):
         QuadrotorPilot(rover.airframe(0.005))
     [quadrotor] = kinds_of(paper(robot="quadrotor", num_robots=2))
     with pytest.raises(ValueError, match="needs the actuators drive and steer, not front"):
