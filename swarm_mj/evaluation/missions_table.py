@@ -38,6 +38,7 @@ DEFAULTS = {spec.name: spec.default for spec in fields(Mission)}
 OPTIONAL = [spec.name for spec in fields(Mission) if NoneType in get_args(spec.type)]
 NUMBERS = [*COSTS, *CONVERGENCE]  # of a mission
 MAY_LACK = {*NUMBERS, *CALLED_WITH, *OPTIONAL}  # the columns that a mission may have no value of
+LATER = (*CONVERGENCE, "pilot")  # files of before 1.1 lack these
 KEYS = ["policy", *REGIME, "seed"]  # which tell missions apart
 MAX_ROWS = MAX_MISSIONS  # of a file
 COLUMNS = {"policy": str, "seed": int} | dict.fromkeys(NUMBERS, float) | REGIME
@@ -129,7 +130,7 @@ def _in_columns(file: parquet.ParquetFile) -> pa.Table:
         elif name in DEFAULTS:
             default = pa.array([DEFAULTS[name]] * num_missions, KINDS[kind])
             columns.append(pa.chunked_array([default]))
-        elif name in CONVERGENCE:  # files of before 1.1 lack it
+        elif name in LATER:
             columns.append(pa.chunked_array([pa.nulls(num_missions, KINDS[kind])]))
         else:
             raise ValueError(f"it has no column {name}")
