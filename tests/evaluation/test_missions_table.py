@@ -11,8 +11,7 @@ import pytest
 from pyarrow import parquet
 
 import swarm_mj
-from swarm_mj.evaluation.missions_table import compared, read_missions, write_missions
-from swarm_mj.evaluation.missions_table import LATER
+from swarm_mj.evaluation.missions_table import LATER, compared, read_missions, write_missions
 from swarm_mj.evaluation.results import CONVERGENCE
 from swarm_mj.mission import Mission, paper
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST
