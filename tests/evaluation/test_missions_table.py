@@ -128,7 +128,10 @@ def changed(path, **columns):
     return path
 
 
-NEEDED = ["seed", "policy", "aoi", "task_cost", "velocity_variance", *CALLED_WITH]
+NEEDED = [
+    *("seed", "policy", "aoi", "task_cost", "velocity_variance"),
+    *(name for name in CALLED_WITH if name not in LATER),
+]
 FOREIGN = {  # two values in place of a column's, and what is said of them
     "lists": ("aoi", [[1.0], [2.0]], "column aoi must hold double, not list<"),
     "dicts": ("policy", [{"a": 1}, {"a": 2}], "column policy must hold string, not struct<"),

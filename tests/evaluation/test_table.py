@@ -15,7 +15,7 @@ def some_result(policy, aoi_mean, **overrides):
         spec.name: {str: "paper", int: 1, float: 1.0}[(get_args(spec.type) or (spec.type,))[0]]
         for spec in fields(Result)
     }
-    values |= {"task_cost_name": None, "config": "{}"}
+    values |= {"task_cost_name": None, "config": "{}", "robot": "point"}
     return Result(**values | {"policy": policy, "aoi_mean": aoi_mean} | overrides)
 
 
@@ -208,6 +208,10 @@ def test_the_lower_bound_stands_below(printed):
         ({"bit_rate": 250e3}, ",\nbit rate 250 kbit/s\n"),
         ({"bit_rate": 1e6}, ",\nbit rate 1 Mbit/s\n"),
         ({"arena": "blocks"}, ",\narena blocks\n"),
+        (
+            {"robot": "quadrotor", "config": '{"height_m": 20.0, "wind_mps": 5.0}'},
+            ",\nrobot quadrotor, at 20 m, wind 5 m/s\n",
+        ),
         ({"radio": "fading rayleigh"}, ",\nradio fading rayleigh\n"),
         ({"prior_knowledge": "map,start"}, ",\nprior knowledge map,start\n"),
         ({"channel": "my:Radio"}, ",\nchannel my:Radio\n"),

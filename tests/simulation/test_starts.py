@@ -8,14 +8,17 @@ from walls import walls
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import ROBOT_RADIUS_M
+from swarm_mj.physics.worlds import Physics
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.starts import Starts, packet_by
 
 MISSION = paper(num_robots=3)
 
 
-def starts(**its):
-    return Starts(**{"mission": MISSION, "obstacles": None, "channel": None} | its)
+def starts(mission=MISSION, obstacles=None):
+    worlds = Physics(mission, 1)
+    worlds.obstacles = obstacles
+    return Starts(mission=mission, worlds=worlds, channel=None)
 
 
 def test_the_second_of_two_robots_that_would_collide_is_blocked():
