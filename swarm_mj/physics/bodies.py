@@ -202,7 +202,7 @@ class BodyWorlds:
         self._batch.set_const()
 
     def _owners(self, numbers: Sequence[int]) -> Int[np.ndarray, "K"]:
-        """Return the robot of each part, where a robot of each kind has so many."""
+        """Return the robot of each part, by how many a robot of each kind has."""
         by_robot = []
         for kind, number in zip(self._kinds, numbers, strict=True):
             by_robot += [number] * kind.num_robots
