@@ -29,9 +29,10 @@ ONE_IN_CITY = {RESULTS / "one-city.csv"}
 RECIPES = {QUICK / "recipes.csv"}
 HOPS = {QUICK / "fig3.csv"}
 REWARDS = {QUICK / "rewards.csv"}
+BODIES = {RESULTS / "bodies.csv"}
 NEWER = (
     *(CONVERGING, LOOKAHEAD, INDEX, ONE, AT_ONE_POINT, ONE_ELSEWHERE, ONE_IN_CITY, RECIPES),
-    *(HOPS, REWARDS),
+    *(HOPS, REWARDS, BODIES),
 )
 
 
