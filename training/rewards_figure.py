@@ -112,7 +112,7 @@ def draw(trained: Sequence[Trained]) -> Figure:
     with styled():
         title = "Flocks of 10 trained on the age and on the velocity variance"
         figure, (ages, variances) = panels(title, rows=2, height_in=4.6)
-        for axes, cost in ((ages, AOI), (variances, VELOCITY_VARIANCE)):
+        for axes, cost in zip((ages, variances), COSTS, strict=True):
             for each in trained:
                 look = look_of(REWARDS[each.reward])
                 low, median, high = np.quantile(each.of(cost), (0.0, 0.5, 1.0), axis=0)
@@ -138,8 +138,9 @@ def table(folder: Path) -> str:
     lines[0] += ["trained on the age", "on the velocity variance", "p"]
     lines.append(["---"] * len(lines[0]))
     age, variance = read_curves(CURVES)
-    for name, cost in (("at the end of training", AOI), ("at the end of training", COSTS[1])):
-        lines.append(_row(f"{cost.title}, {name}", age.of(cost)[:, -1], variance.of(cost)[:, -1]))
+    for cost in COSTS:
+        last = (each.of(cost)[:, -1] for each in (age, variance))
+        lines.append(_row(f"{cost.title}, at the end of training", *last))
     swings = [_swings(each.aoi) for each in (age, variance)]
     lines.append(_row("mean change of the age between two evaluations", *swings))
     for ratio in (0.15, 0.5):

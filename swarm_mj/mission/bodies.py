@@ -9,6 +9,7 @@ from swarm_mj.mission.labels import NEW
 from swarm_mj.mission.team import Team
 from swarm_mj.system.fields import above_zero, setting
 
+LEAST_HEIGHT_M = 0.5  # of robots that fly: below it a set point does not sink
 POINT = "point"  # the paper's robot: a mass without size, heading or height
 
 
@@ -53,7 +54,7 @@ class Bodies(Team):
         "height at which robots fly, above the floor",
         label="height",
         unit="m",
-        low=0.5,
+        low=LEAST_HEIGHT_M,
         high=1000.0,
         source=NEW,
     )

@@ -25,7 +25,7 @@ def add_file(spec: MjSpec, mission: Mission) -> None:
         model = theirs.compile()
         num_obstacles = len(obstacles_of(model).kind)
     except ValueError as error:
-        raise _refused(mission.arena, error) from error
+        raise refused("arena", mission.arena, error) from error
     if theirs.joints:
         moves = theirs.joints[0].parent.name or "a body without a name"
         raise ValueError(f"arena {mission.arena}: {moves} has a joint, but obstacles stand still")
@@ -88,7 +88,7 @@ def read_mjcf(what: str, file: str) -> MjSpec:
         _check_copies(path)
         return MjSpec.from_file(str(path))
     except ValueError as error:
-        raise ValueError(f"{what} {file}: {' '.join(str(error).split())}") from error
+        raise refused(what, file, error) from error
 
 
 def _elements(path: Path, above: tuple[Path, ...] = ()) -> Iterator[ElementTree.Element]:
@@ -177,5 +177,6 @@ def _check_file(element: ElementTree.Element, folders: set[Path]) -> None:
             raise ValueError(f"{element.tag} {name} is a folder, a pipe or a device; name a file")
 
 
-def _refused(file: str, error: ValueError) -> ValueError:
-    return ValueError(f"arena {file}: {' '.join(str(error).split())}")
+def refused(what: str, file: str, error: ValueError) -> ValueError:
+    """Return the refusal of a file in one line; MuJoCo says it in several."""
+    return ValueError(f"{what} {file}: {' '.join(str(error).split())}")

@@ -18,6 +18,7 @@ from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, Stream, normal
+from swarm_mj.mission.bodies import LEAST_HEIGHT_M
 from swarm_mj.mission.faults import MIN_SURVIVORS
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
@@ -40,7 +41,6 @@ from swarm_mj.system.user_code import is_ours
 LAGS = [int(mjtDyn.mjDYN_FILTER), int(mjtDyn.mjDYN_FILTEREXACT)]  # a control, a while later
 VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robot
 FARTHEST_M = 1e6  # no robot of a stable model gets so far
-LEAST_HEIGHT_M = 0.5  # below which no set point is
 
 
 class _Flown(NamedTuple):
@@ -57,6 +57,7 @@ class _Flown(NamedTuple):
     wanted: SetPoint
     has_crashed: Bool[np.ndarray, "B n"]
     is_trusted: bool  # the pilot is the package's own
+    free: Sensed | None  # views of a free base's states; None: its base is on a plane
 
 
 class BodyWorlds:
@@ -146,6 +147,7 @@ class BodyWorlds:
                 wanted=wanted,
                 has_crashed=self._has_crashed[:, robots],
                 is_trusted=is_ours(pilot),
+                free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )
             found.append(flown)
         return found
@@ -372,18 +374,27 @@ def _seen(array: np.ndarray) -> np.ndarray:
     return view
 
 
+def _free_states(
+    qpos: Float[np.ndarray, "B n Q"],
+    qvel: Float[np.ndarray, "B n V"],
+    sensors: Float[np.ndarray, "B n S"],
+) -> Sensed:
+    """Return views of the states of free bases, made once: they follow MuJoCo's steps."""
+    return Sensed(
+        position_m=_seen(qpos[..., :3]),
+        attitude=_seen(qpos[..., 3:FREE_QPOS]),
+        velocity_mps=_seen(qvel[..., :3]),
+        turn_rate_rps=_seen(qvel[..., 3:FREE_QVEL]),
+        sensors=sensors,
+    )
+
+
 def _sensed(flown: _Flown) -> Sensed:
     """Return the states of a kind's robots."""
+    if flown.free is not None:
+        return flown.free
     qpos = flown.qpos
     qvel = flown.qvel
-    if flown.kind.is_free:
-        return Sensed(
-            position_m=_seen(qpos[..., :3]),
-            attitude=_seen(qpos[..., 3:FREE_QPOS]),
-            velocity_mps=_seen(qvel[..., :3]),
-            turn_rate_rps=_seen(qvel[..., 3:FREE_QVEL]),
-            sensors=flown.sensors,
-        )
     shape = qpos.shape[:2]
     position_m = np.empty((*shape, 3))
     velocity_mps = np.zeros((*shape, 3))

@@ -20,7 +20,7 @@ from mujoco._specs import MjsBody, MjSpec
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.arena_files import read_mjcf, take_over_settings
+from swarm_mj.physics.arena_files import read_mjcf, refused, take_over_settings
 from swarm_mj.physics.pilots import Airframe, Pilot, QuadrotorPilot, RoverPilot
 from swarm_mj.system.arguments import check_callable, did_you_mean
 from swarm_mj.system.packages import asset
@@ -261,8 +261,8 @@ def _read(kind: str) -> MjSpec:
 def _compiled(kind: str, spec: MjSpec) -> MjModel:
     try:
         return spec.compile()
-    except ValueError as error:  # MuJoCo's, in several lines
-        raise ValueError(f"robot {kind}: {' '.join(str(error).split())}") from error
+    except ValueError as error:
+        raise refused("robot", kind, error) from error
 
 
 def _base(spec: MjSpec) -> MjsBody:

@@ -128,13 +128,17 @@ def num_substeps(mission: Mission) -> int:
         return 1
     longest_m = ROBOT_RADIUS_M / (2.0 if mission.collide else 1.0)
     longest_s = min(CONTACT_STEP_S, longest_m / mission.max_velocity_mps)
-    return math.ceil(mission.window_s / longest_s - 1e-9)
+    return _steps_of(mission, longest_s)
 
 
 def num_body_steps(mission: Mission, kinds: Sequence[RobotKind]) -> int:
     """MuJoCo steps per window of robots with bodies: no step is longer than any model asks for."""
-    shortest_s = min(kind.step_s for kind in kinds)
-    return math.ceil(mission.window_s / shortest_s - 1e-9)
+    return _steps_of(mission, longest_s=min(kind.step_s for kind in kinds))
+
+
+def _steps_of(mission: Mission, longest_s: float) -> int:
+    """Return the steps into which a window is divided, none longer than this."""
+    return math.ceil(mission.window_s / longest_s - 1e-9)
 
 
 def compiled_scene(spec: MjSpec, scene: Scene | None) -> MjModel:
