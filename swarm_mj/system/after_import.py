@@ -1,7 +1,7 @@
 """Something to do once a library is there, without waiting for the library."""
 
 import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from importlib.abc import MetaPathFinder
 from importlib.machinery import ModuleSpec
 from importlib.util import find_spec
@@ -26,7 +26,7 @@ class _Waiting(MetaPathFinder):
         self._action = action
 
     def find_spec(
-        self, fullname: str, _path: Sequence[str] | None, _target: ModuleType | None = None
+        self, fullname: str, _path: object, _target: ModuleType | None = None
     ) -> ModuleSpec | None:
         """Leave every module to the finders after this one, but listen to the library's loader."""
         if fullname != self._library:

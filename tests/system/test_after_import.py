@@ -51,3 +51,15 @@ def test_looking_for_the_library_imports_nothing(library):
     assert seen == []
     importlib.import_module(library)
     assert seen == [library]
+
+
+def test_modules_of_a_namespace_package_are_found(tmp_path, monkeypatch):
+    """Its path is Python's own kind of list, not a sequence."""
+    (tmp_path / "spread_out").mkdir()
+    (tmp_path / "spread_out" / "part.py").write_text("value = 4\n")
+    monkeypatch.syspath_prepend(tmp_path)
+    monkeypatch.setattr(sys, "meta_path", sys.meta_path[:])
+    after_import("no_such_library", lambda: None)
+    assert importlib.import_module("spread_out.part").value == 4
+    sys.modules.pop("spread_out.part")
+    sys.modules.pop("spread_out")
