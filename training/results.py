@@ -5,10 +5,10 @@
     python training/results.py --studies paper-random-walk channels
 
 Each file of `training/studies/` is a study, flown as `swarm-mj study run` does. `gnn` flies the
-trained policies of `reproduce.py`; `deciding` runs `swarm-mj bench`. Each leaves a
-table of its name in `training/results/`: `NAME.csv` has a row for each policy and regime,
-`NAME.parquet` one for each mission. What is there of this commit is kept; `--force` flies it again,
-but for `gnn`: there `reproduce.py --force` does, and trains anew.
+trained policies of `reproduce.py`, `crashes` the studies of `crashes.py`; `deciding` runs
+`swarm-mj bench`. Each leaves a table of its name in `training/results/`: `NAME.csv` has a row for
+each policy and regime, `NAME.parquet` one for each mission. What is there of this commit is kept;
+`--force` flies it again, but for `gnn`: there `reproduce.py --force` does, and trains anew.
 An interrupted run continues where it broke off. Then `tools/results_table.py` writes the numbers
 into the docs, and `make figures` draws them.
 """
@@ -23,6 +23,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import bounds
+import crashes
 import flocking_converges
 import reproduce
 
@@ -30,6 +31,8 @@ from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.study import read_study
+from swarm_mj.evaluation.results import Result
+from swarm_mj.evaluation.results_files import read_results, write_results
 from swarm_mj.evaluation.study import Study
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
@@ -43,7 +46,7 @@ MISSIONS, WINDOWS = 2, 12  # of smoke, each study's
 FOLDER = ROOT / "training" / "studies"
 SHIPPED = {"impairments": "impairments-small"}  # with the package, under other names
 STUDIES = tuple(sorted([*SHIPPED, *(path.stem for path in FOLDER.glob("*.toml"))]))
-OTHERS = ("gnn", "floor", "converging-courses", "deciding")  # tables that no study can describe
+OTHERS = ("gnn", "floor", "converging-courses", "crashes", "deciding")  # no study describes them
 KINDS = (".csv", ".parquet")
 MAX_BYTES = 100_000_000
 
@@ -98,19 +101,40 @@ def smoked(study: Study) -> Study:
 
 def fly_study(settings: Settings, name: str) -> int:
     """Fly a study, or the rest of it; return the exit code."""
-    study = study_of(name)
-    study = smoked(study) if settings.is_smoke else study
     drafts = [settings.drafts.absolute() / f"{name}{kind}" for kind in KINDS]
-    targets = [settings.folder / draft.name for draft in drafts]
-    say(f"{name}: {study.num_missions:,} missions")
-    how = {"jobs": settings.jobs, "resume": not settings.force, "force": settings.force}
-    with redirect_stdout(io.StringIO()):  # the tables are printed nowhere: they are in the docs
-        code = run_study(StudyFlags(csv=drafts[0], parquet=drafts[1], **how), study)
-    for draft, target in zip(drafts, targets, strict=True):
+    code = fly_drafts(settings, study_of(name), drafts)
+    for draft in drafts:
         if code == DONE:
-            write_bytes(target, read_file(draft, "draft", MAX_BYTES))
+            write_bytes(settings.folder / draft.name, read_file(draft, "draft", MAX_BYTES))
             draft.unlink()
     return code
+
+
+def fly_drafts(settings: Settings, study: Study, drafts: Sequence[Path]) -> int:
+    """Fly a study, or the rest of it, into a CSV and a Parquet file; return the exit code."""
+    study = smoked(study) if settings.is_smoke else study
+    csv_path, parquet_path = drafts
+    say(f"{csv_path.stem}: {study.num_missions:,} missions")
+    how = {"jobs": settings.jobs, "resume": not settings.force, "force": settings.force}
+    with redirect_stdout(io.StringIO()):  # the tables are printed nowhere: they are in the docs
+        return run_study(StudyFlags(csv=csv_path, parquet=parquet_path, **how), study)
+
+
+def fly_crashes(settings: Settings) -> int:
+    """Fly robots that avoid each other by news of different ages; return the exit code."""
+    drafts: list[Path] = []
+    rows: list[Result] = []
+    for name, study in crashes.studies().items():
+        its = [settings.drafts.absolute() / f"crashes-{name}{kind}" for kind in KINDS]
+        code = fly_drafts(settings, study, its)
+        if code != DONE:
+            return code
+        rows += read_results(its[0])
+        drafts += its
+    write_results(settings.folder / "crashes.csv", rows)
+    for draft in drafts:
+        draft.unlink()
+    return DONE
 
 
 def fly_floor(settings: Settings) -> int:
@@ -160,6 +184,7 @@ FLOWN_BY: dict[str, Callable[[Settings], int]] = {
     "deciding": measure_deciding,
     "floor": fly_floor,
     "converging-courses": fly_courses,
+    "crashes": fly_crashes,
     "gnn": fly_gnn,
 }
 
