@@ -3,7 +3,17 @@
 import added_tasks
 import numpy as np
 import pytest
-from added_tasks import DAMPING_PER_S, STIFFNESS_PER_S2, Coverage, Formation, block, cell, moments
+from added_tasks import (
+    APART_M,
+    DAMPING_PER_S,
+    STIFFNESS_PER_S2,
+    Coverage,
+    Formation,
+    Reynolds,
+    block,
+    cell,
+    moments,
+)
 from channels import tell_everyone_the_truth, to_nobody
 from hypothesis import given
 from hypothesis import strategies as st
@@ -32,13 +42,15 @@ def news_of(*entries, num_robots):
     return buffers
 
 
-@pytest.mark.parametrize("name", ["Formation", "Coverage"])
-def test_it_flies_by_name(name):
+@pytest.mark.parametrize("robot", ["point", "quadrotor"])
+@pytest.mark.parametrize("name", ["Formation", "Coverage", "Reynolds"])
+def test_it_flies_by_name(name, robot):
     """As the command in the example's own docstring does."""
     run = swarm_mj.fly(
         "random-walk",
         policy="tdma",
         controller=f"added_tasks:{name}",
+        robot=robot,
         num_robots=6,
         num_windows=300,
     )
@@ -238,3 +250,31 @@ def test_moments_of_a_rectangle_by_hand():
     """2 m by 4 m from (0, 0), about (0, 0): A 8; A x 8, A y 16; 8 (2² + 4²) / 3."""
     rectangle = np.array([[0.0, 0.0], [2.0, 0.0], [2.0, 4.0], [0.0, 4.0]])
     assert moments(rectangle, np.zeros(2)) == pytest.approx((8.0, 8.0, 16.0, 160.0 / 3.0))
+
+
+def test_a_flock_is_drawn_to_the_mean_of_those_it_has_heard_of():
+    """Robot 0, at rest, has heard of two that are far, and of one of the two that it moves."""
+    news = news_of((1, [30.0, 0.0]), (2, [0.0, 60.0]), num_robots=4)
+    news.velocity_mps[0, 0, 1] = [2.0, 0.0]
+    found = Reynolds()(news, states_of([[[0.0, 0.0]] * 4]))
+    # Eq. 16 is a mean over both, and so is cohesion.
+    assert found[0, 0] == pytest.approx([1.0 + 0.05 * 15.0, 0.05 * 30.0])
+    assert np.all(found[0, 3] == 0.0)
+
+
+def test_a_flock_keeps_apart():
+    """Of one at half the distance, half of the push is left, in space as in the plane."""
+    for way in ([1.0, 0.0], [0.0, 0.0, 1.0]):
+        near_m = 0.5 * APART_M * np.array(way)
+        buffers = empty_buffers(1, 2, num_axes=len(way))
+        buffers.timestamp[0, 0, 1] = 1.0
+        buffers.position_m[0, 0, 1] = near_m
+        found = Reynolds()(buffers, states_of([[[0.0] * len(way)] * 2]))
+        np.testing.assert_allclose(found[0, 0], 0.05 * near_m - 0.5 * 3.0 * np.array(way))
+
+
+def test_the_spread_is_that_of_active_robots():
+    states = states_of(
+        [[[0.0, 0.0], [6.0, 8.0], [900.0, 0.0]]], is_active=np.array([[True, True, False]])
+    )
+    assert Reynolds().cost(states) == pytest.approx([5.0])

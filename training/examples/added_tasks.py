@@ -1,4 +1,4 @@
-"""Two controllers that act on stale positions, formation and coverage: parts of a user's own.
+"""Three controllers that act on stale positions: formation, coverage and Reynolds' flocks.
 
     swarm-mj fly --controller training.examples.added_tasks:Coverage --task random-walk
 
@@ -9,8 +9,9 @@ Formation is displacement consensus of double integrators (Oh, Park and Ahn, Aut
 u_i = k (mean over j of (p_j + d_i - d_j) - p_i) - c v_i. As c² >= 2k, no delay makes the robots
 oscillate ever wider. Coverage is Lloyd's algorithm (Cortés, Martínez, Karatas and Bullo, IEEE
 Transactions on Robotics and Automation 20(2), 2004): u_i = k (C_i - p_i) - c v_i, where C_i is the
-centroid of a Voronoi cell. There is one difference in both: robot i takes p_j from its buffer, and
-no teammate that it has not heard of.
+centroid of a Voronoi cell. Flocks align, keep together and keep apart by Reynolds' three rules
+(SIGGRAPH 1987). There is one difference in all: robot i takes p_j from its buffer, and no teammate
+that it has not heard of.
 """
 
 import math
@@ -18,6 +19,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
+from swarm_mj.control.motion import flocking
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers
@@ -28,7 +30,12 @@ DAMPING_PER_S = 1.0  # c: critical, 2 sqrt(k)
 BLOCK_SHARE = 0.5  # width of the formation over the side of the area
 
 
-def steer(target_m: Float[np.ndarray, "B N 2"], states: RobotStates) -> Float[np.ndarray, "B N 2"]:
+COHESION_PER_S2 = 0.05
+APART_M = 20.0  # robots nearer than this push each other away
+SEPARATION_MPS2 = 3.0  # the push of one that is all but touched
+
+
+def steer(target_m: Float[np.ndarray, "B N D"], states: RobotStates) -> Float[np.ndarray, "B N D"]:
     """Accelerate towards targets [m], critically damped: k (target - p) - c v [m/s²]."""
     apart_m = target_m - states.position_m
     return STIFFNESS_PER_S2 * apart_m - DAMPING_PER_S * states.velocity_mps
@@ -42,7 +49,7 @@ class Formation:
     def __init__(self, mission: Mission) -> None:
         self._place_m = block(mission.num_robots, BLOCK_SHARE * mission.side_m)
 
-    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N D"]:
         """Steer each robot to the mean of its places relative to known teammates [m/s²]."""
         target_m = states.position_m.copy()  # of robots that know nobody
         _mean_places(buffers.is_known, buffers.position_m, self._place_m, target_m)
@@ -53,7 +60,7 @@ class Formation:
 
         The formation may stand anywhere, but not turned: the places are those of the best fit.
         """
-        off_m = states.position_m - self._place_m
+        off_m = states.position_m[..., :2] - self._place_m
         if states.is_active is not None:
             off_m = off_m[states.is_active].reshape(len(off_m), -1, 2)
         off_m = off_m - np.mean(off_m, axis=1, keepdims=True)
@@ -68,6 +75,36 @@ def block(num_robots: int, width_m: float) -> Float[np.ndarray, "N 2"]:
     return place_m - np.mean(place_m, axis=0)
 
 
+class Reynolds:
+    """Robots fly as a flock: at one velocity, together, and not too near to each other.
+
+    Alignment is the paper's (Eq. 16). Cohesion draws a robot to the mean of where it takes the
+    others to be, and separation away from each that is near.
+    """
+
+    cost_name, cost_unit = "spread of the flock", "m"
+
+    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N D"]:
+        """Return the sum of the three rules' accelerations [m/s²]."""
+        acceleration_mps2 = flocking(buffers, states.velocity_mps, "heard")
+        _keep_together(buffers.is_known, buffers.position_m, states.position_m, acceleration_mps2)
+        return acceleration_mps2
+
+    def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
+        """Return the root mean square distance of the active robots from their middle [m]."""
+        return spread_m(states.position_m, states.is_active)
+
+
+def spread_m(
+    position_m: Float[np.ndarray, "B N D"], is_active: Bool[np.ndarray, "B N"] | None
+) -> Float[np.ndarray, "B"]:
+    """Return how far the active robots are from their middle, in root mean square [m]."""
+    weight = np.ones(position_m.shape[:2]) if is_active is None else is_active.astype(float)
+    weight = (weight / np.sum(weight, axis=1, keepdims=True))[..., None]
+    off_m = position_m - np.sum(weight * position_m, axis=1, keepdims=True)
+    return np.sqrt(np.sum(weight * off_m**2, axis=(1, 2)))
+
+
 class Coverage:
     """Robots spread out, so that no point of the area is far from all of them."""
 
@@ -76,7 +113,7 @@ class Coverage:
     def __init__(self, mission: Mission) -> None:
         self._half_side_m = mission.half_side_m
 
-    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N 2"]:
+    def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N D"]:
         """Steer each robot to the centroid of the cell that it believes to be its own [m/s²]."""
         target_m = states.position_m.copy()
         _centroids(buffers.is_known, buffers.position_m, self._half_side_m, target_m)
@@ -87,6 +124,32 @@ class Coverage:
         position_m, is_active = states.position_m, states.is_active
         counts = np.ones(position_m.shape[:2], dtype=np.bool_) if is_active is None else is_active
         return np.sqrt(_mean_squares(position_m, self._half_side_m, counts))
+
+
+@compiled(makes_arrays=False)
+def _keep_together(
+    is_known: Bool[np.ndarray, "B N N"],
+    known_m: Float[np.ndarray, "B N N D"],
+    position_m: Float[np.ndarray, "B N D"],
+    acceleration_mps2: Float[np.ndarray, "B N D"],
+) -> None:
+    """Add cohesion and separation to accelerations."""
+    for b in range(is_known.shape[0]):
+        for i in range(is_known.shape[1]):
+            num_known = np.sum(is_known[b, i]) - is_known[b, i, i]
+            for j in range(is_known.shape[1]):
+                if j == i or not is_known[b, i, j]:
+                    continue
+                far_m2 = 0.0
+                for axis in range(position_m.shape[2]):
+                    far_m2 += (known_m[b, i, j, axis] - position_m[b, i, axis]) ** 2
+                far_m = math.sqrt(far_m2)
+                pull = COHESION_PER_S2 / num_known
+                if 0.0 < far_m < APART_M:
+                    pull -= SEPARATION_MPS2 * (1.0 - far_m / APART_M) / far_m
+                for axis in range(position_m.shape[2]):
+                    apart_m = known_m[b, i, j, axis] - position_m[b, i, axis]
+                    acceleration_mps2[b, i, axis] += pull * apart_m
 
 
 @compiled()
