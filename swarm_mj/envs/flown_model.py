@@ -30,6 +30,10 @@ OF_OTHERS = (
     "a policy is made of a model that decides for one robot, and this one was trained on "
     'another environment; train on swarm_mj.envs.sb3.make_vec_env(..., agent="robot")'
 )
+OF_SENSORS = (
+    "a policy decides by what robots have heard, and this model sees sensors, too; fly it in its "
+    "environment, or train without with_sensors=True"
+)
 
 
 class Flown(LearnedPolicy):
@@ -212,6 +216,8 @@ def _num_robots_and_features(model: BaseAlgorithm) -> tuple[int, int]:
     seen: Mapping[str, spaces.Space[Any]] = {}
     if isinstance(model.observation_space, spaces.Dict):
         seen = model.observation_space.spaces
+    if "sensors" in seen:
+        raise ValueError(OF_SENSORS)
     shape = seen["observation"].shape if "observation" in seen else None
     is_ours = seen.keys() <= {"action_mask", "observation", "parent"}
     if not is_ours or shape is None or len(shape) != 2:

@@ -129,9 +129,9 @@ class SwarmEnv(gymnasium.Env[Observation, np.ndarray], EzPickle):
 
         Returns:
             The team's observation and the info. The observation has `observation` [N N F] and
-            `action_mask` [N N], row i of each being robot i's, and `parent` [N N] if the option
-            `with_parents` is set. The info has the seed, and the costs by the names of
-            `swarm-mj fly --json`.
+            `action_mask` [N N], row i of each being robot i's, `parent` [N N] if the option
+            `with_parents` is set, and `sensors` [N S] if `with_sensors` is. The info has the seed,
+            and the costs by the names of `swarm-mj fly --json`.
 
         Raises:
             ValueError: If no connected team could be drawn.

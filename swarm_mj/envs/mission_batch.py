@@ -20,6 +20,7 @@ from swarm_mj.envs.credit import (
     snapshot_channel,
 )
 from swarm_mj.mission import Mission
+from swarm_mj.physics.robots import kinds_of, sensor_limits
 from swarm_mj.policies.gnn.feature_sets import make_extractor
 from swarm_mj.policies.gnn.graphs import Graphs, check_width
 from swarm_mj.protocol.buffers import NEVER
@@ -52,6 +53,7 @@ class MissionBatch:
         features: str = "extended",
         reward: str = "aoi",
         with_parents: bool = False,
+        with_sensors: bool = False,
         components: Components = Components(),
         keeps_recipients: bool = False,
         unknown_age: float = 0.0,
@@ -64,6 +66,7 @@ class MissionBatch:
             features: As there.
             reward: As there.
             with_parents: As there.
+            with_sensors: As there; raises ValueError for robots without sensors.
             components: Channel, controller and scene, where they are not the mission's own.
             keeps_recipients: Whether decisions are kept, so that checkpoints can fly it again.
             unknown_age: How much older than the mission a teammate never heard of counts in
@@ -75,6 +78,8 @@ class MissionBatch:
         self.features = features
         self.reward = reward
         self.with_parents = with_parents
+        self.with_sensors = with_sensors
+        self.sensor_limits = _sensor_limits(mission) if with_sensors else np.zeros(0)  # S
         self.swarm: Swarm | None = None  # made when it begins
         self._graphs: Graphs | None = None  # likewise
         self.components = components
@@ -246,6 +251,10 @@ class MissionBatch:
         }
         if self.with_parents:  # a copy: graphs may share P with the swarm, which writes it in place
             seen["parent"] = self.graphs.parent.reshape(shape).copy()
+        if self.with_sensors:
+            sensors = self.flown.states.sensors
+            assert sensors is not None  # as there are limits of them
+            seen["sensors"] = sensors.astype(np.float32)
         return seen
 
     def infos(self) -> Info:
@@ -275,6 +284,17 @@ class MissionBatch:
         """Return the first mission's view and infos, for environments of a single mission."""
         info = {name: values[0].item() for name, values in self.infos().items()}
         return {name: values[0] for name, values in self.observation.items()}, info
+
+
+def _sensor_limits(mission: Mission) -> Float[np.ndarray, "S"]:
+    """Return how large robots' sensor numbers can be; raise ValueError if there are none."""
+    limits = sensor_limits(kinds_of(mission)) if mission.has_bodies else np.zeros(0)
+    if limits.size == 0:
+        raise ValueError(
+            f"with_sensors needs robots with sensors, and robot {mission.robot} has none; choose "
+            "an MJCF file with sensors, or with_sensors=False"
+        )
+    return limits
 
 
 def seeds_from(first: int | None, number: int) -> list[int | None]:

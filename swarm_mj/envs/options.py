@@ -53,6 +53,7 @@ class BatchOptions(TaskAndFields, total=False):
     features: str
     reward: str
     with_parents: bool
+    with_sensors: bool
     channel: Channel | str | None
     controller: Controller | str | None
     scene: Scene | str | None
@@ -67,6 +68,7 @@ def make_batch(
     features: str = "extended",
     reward: str = "aoi",
     with_parents: bool = False,
+    with_sensors: bool = False,
     channel: Channel | str | None = None,
     controller: Controller | str | None = None,
     scene: Scene | str | None = None,
@@ -89,6 +91,8 @@ def make_batch(
             unit; or "credit", each robot's own: by how much the team's age would be higher had the
             robot been silent in this window [windows].
         with_parents: Whether robots see the parents P as well, for graph networks.
+        with_sensors: Whether robots see the numbers of their own sensors, too; of robots with
+            bodies whose models have sensors.
         channel: As of `Swarm`, or its name, `module:Name`; a copy of it is used.
         controller: Likewise.
         scene: Likewise.
@@ -120,6 +124,7 @@ def make_batch(
         features=features,
         reward=reward,
         with_parents=with_parents,
+        with_sensors=with_sensors,
         components=components,
     )
 
@@ -159,7 +164,8 @@ def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[A
     `observation` [N, F] is what it knows of every teammate, itself included: see `FEATURES` of the
     feature set; all are normalised, and none has a unit. `action_mask` [N] is 1 for recipients
     within reach; itself, which is silence, always is. `parent` [N] is the robot that a
-    teammate's news came over first, or -1.
+    teammate's news came over first, or -1. `sensors` [S] are the numbers of its sensors, in
+    MuJoCo's units, each within its sensor's cutoff, if the model gives one.
     """
     num_robots = batch.mission.num_robots
     most = np.inf if is_own_set(batch.features) else largest_feature(batch.mission)
@@ -169,6 +175,9 @@ def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[A
     }
     if batch.with_parents:
         seen["parent"] = spaces.Box(NO_PARENT, num_robots - 1, (num_robots,), np.int32)
+    if batch.with_sensors:
+        limits = batch.sensor_limits.astype(np.float32)
+        seen["sensors"] = spaces.Box(-limits, limits, dtype=np.float32)
     return spaces.Dict(seen), spaces.Discrete(num_robots)
 
 

@@ -103,8 +103,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
 
         Returns:
             The views and the infos, by agent. A view has `observation` [N F] and `action_mask` [N],
-            and `parent` [N] if the option `with_parents` is set; an info has the seed and the
-            team's costs.
+            `parent` [N] if the option `with_parents` is set, and `sensors` [S] if `with_sensors`
+            is; an info has the seed and the team's costs.
 
         Raises:
             ValueError: If no connected team could be drawn.

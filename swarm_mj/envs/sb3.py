@@ -15,7 +15,7 @@ from stable_baselines3.common.torch_layers import CombinedExtractor
 from stable_baselines3.common.vec_env import VecNormalize, unwrap_vec_wrapper
 from torch import nn
 
-from swarm_mj.envs.flown_model import OF_OTHERS, Flown, is_masked, missions_of
+from swarm_mj.envs.flown_model import OF_OTHERS, OF_SENSORS, Flown, is_masked, missions_of
 from swarm_mj.envs.held_out_callback import HeldOutCallback
 from swarm_mj.envs.mission_batch import MissionBatch
 from swarm_mj.envs.options import (
@@ -165,6 +165,8 @@ def _trained_on(model: BaseAlgorithm) -> MissionBatch:
         raise ValueError(
             "a policy of this kind sees no parents; train without with_parents=True, or " + INSTEAD
         )
+    if batch.with_sensors:
+        raise ValueError(OF_SENSORS)
     normalised = unwrap_vec_wrapper(env, VecNormalize)
     if normalised is not None and normalised.norm_obs:
         raise ValueError(

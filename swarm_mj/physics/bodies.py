@@ -31,6 +31,7 @@ from swarm_mj.physics.robots import (
     collides,
     kinds_of,
     make_pilots,
+    sensor_limits,
 )
 from swarm_mj.physics.scene import Scene, compiled_scene, compose, num_body_steps
 from swarm_mj.physics.state import RobotStates
@@ -64,8 +65,8 @@ class BodyWorlds:
     """B MuJoCo worlds of N robots with bodies.
 
     Attributes:
-        states: Where the robots are [m], [B N 3], how fast [m/s], their attitude, and who is
-            active.
+        states: Where the robots are [m], [B N 3], how fast [m/s], their attitude, who is active,
+            and what their sensors measured.
         obstacles: What stands in the scene; None: nothing.
         reach_m: How far from its base a robot collides, [N].
     """
@@ -111,6 +112,7 @@ class BodyWorlds:
         self.reach_m = np.concatenate([np.full(kind.num_robots, kind.reach_m) for kind in kinds])
         self._works: np.ndarray | None = None  # who was not made to fail
         self._flown = self._divide(kinds, pilots)
+        self._num_sensed = len(sensor_limits(kinds))  # S
         self.states = RobotStates(
             position_m=np.zeros((*shape, 3)),
             velocity_mps=np.zeros((*shape, 3)),
@@ -246,6 +248,8 @@ class BodyWorlds:
                 flown.qpos[..., :2] = its_m[..., :2]
                 flown.qpos[..., 2] = np.arctan2(its_mps[..., 1], its_mps[..., 0])
                 flown.qvel[..., :2] = its_mps[..., :2]
+        if self._num_sensed > 0:
+            self._batch.forward()  # or pilots would begin with what sensors measured before
         self._steer()
         self._start_actuators()
         self._batch.forward()
@@ -323,9 +327,14 @@ class BodyWorlds:
         states = self.states
         position_m = np.empty_like(states.position_m)
         velocity_mps = np.empty_like(position_m)
-        attitude = np.empty((*position_m.shape[:2], 4))
+        shape = position_m.shape[:2]
+        attitude = np.empty((*shape, 4))
+        # A robot with fewer sensors than others has zeros behind its own.
+        sensors = np.zeros((*shape, self._num_sensed)) if self._num_sensed > 0 else None
         for flown in self._flown:
             sensed = _sensed(flown)
+            if sensors is not None:
+                sensors[:, flown.robots, : sensed.sensors.shape[2]] = sensed.sensors
             position_m[:, flown.robots] = sensed.position_m
             velocity_mps[:, flown.robots] = sensed.velocity_mps
             attitude[:, flown.robots] = sensed.attitude
@@ -342,6 +351,7 @@ class BodyWorlds:
             velocity_mps=velocity_mps,
             attitude=attitude,
             has_crashed=self._has_crashed.copy(),
+            sensors=sensors,
         )
 
 

@@ -36,7 +36,7 @@ class Airframe:
     least: Float[np.ndarray, "U"]  # of each control; -inf without a limit
     most: Float[np.ndarray, "U"]  # of each control; inf without a limit
     thrust: Float[np.ndarray, "U 6"]  # force and torque on the base of a control of 1; 0: no motor
-    sensors: tuple[str, ...]  # the names of the model's sensors, in the order of their numbers
+    sensors: dict[str, slice]  # the columns of each of the model's sensors, by its name
     step_s: float  # MuJoCo's step
 
 
@@ -47,7 +47,7 @@ class Sensed(NamedTuple):
     attitude: Float[np.ndarray, "B n 4"]  # from the robot's frame to the world's
     velocity_mps: Float[np.ndarray, "B n 3"]
     turn_rate_rps: Float[np.ndarray, "B n 3"]  # about the axes of the robot's own frame [rad/s]
-    sensors: Float[np.ndarray, "B n S"]  # the numbers of the model's sensors, before this step
+    sensors: Float[np.ndarray, "B n S"]  # the numbers of the model's sensors, a step ago
 
 
 class SetPoint(NamedTuple):

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
-from mujoco._enums import mjtBias, mjtJoint
+from mujoco._enums import mjtBias, mjtJoint, mjtSensor
 from mujoco._functions import mj_forward, mj_fullM, mju_sparse2dense
 from mujoco._specs import MjsBody, MjSpec
 from mujoco._structs import MjData, MjModel
@@ -34,6 +34,7 @@ PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
 
 OwnPilot = Pilot | type | str  # an object, a class that is made for an airframe, or its name
 CALLED_WITH = ("sensed", "wanted", "control")  # a pilot
+NEVER_CUT = [int(mjtSensor.mjSENS_GEOMFROMTO), int(mjtSensor.mjSENS_CONTACT)]  # by a cutoff
 
 
 class Shipped(NamedTuple):
@@ -81,6 +82,25 @@ class RobotKind:
         off_m = np.linalg.norm(data.geom_xpos - data.xpos[1], axis=1) + self.model.geom_rbound
         return float(np.max(off_m[collides(self.model)]))
 
+    @cached_property
+    def sensors(self) -> dict[str, slice]:
+        """The columns of each sensor's numbers, by its name; those without a name are left out."""
+        found: dict[str, slice] = {}
+        for s in range(self.model.nsensor):
+            sensor = self.model.sensor(s)
+            first = int(sensor.adr[0])
+            if sensor.name:
+                found[sensor.name] = slice(first, first + int(sensor.dim[0]))
+        return found
+
+    @property
+    def sensor_limits(self) -> Float[np.ndarray, "S"]:
+        """How large each of its sensors' numbers can be, by their cutoffs; inf without one."""
+        model = self.model
+        is_cut = (model.sensor_cutoff > 0.0) & ~np.isin(model.sensor_type, NEVER_CUT)
+        limit = np.where(is_cut, model.sensor_cutoff, np.inf)
+        return np.repeat(limit, model.sensor_dim)
+
     def _thrust(self) -> Float[np.ndarray, "U 6"]:
         """Return the force and torque on the base, in its axes, of a control of 1 of each motor."""
         model = self.model
@@ -118,7 +138,7 @@ class RobotKind:
             least=np.where(is_limited, least, -np.inf),
             most=np.where(is_limited, most, np.inf),
             thrust=self._thrust(),
-            sensors=tuple(model.sensor(s).name for s in range(model.nsensor)),
+            sensors=self.sensors,
             step_s=step_s,
         )
 
@@ -153,6 +173,34 @@ def kinds_of(mission: Mission) -> list[RobotKind]:
         found.append(kind)
         first += num_robots
     return found
+
+
+def sensor_columns(mission: Mission) -> list[dict[str, slice]]:
+    """Return which columns of `RobotStates.sensors` belong to which sensor.
+
+    Args:
+        mission: The mission.
+
+    Returns:
+        For each kind of robots, in the order of `mission.groups`: the columns of each sensor that
+        has a name. Points have none.
+
+    Raises:
+        ValueError: A model is refused.
+    """
+    return [kind.sensors for kind in kinds_of(mission)] if mission.has_bodies else []
+
+
+def sensor_limits(kinds: Sequence[RobotKind]) -> Float[np.ndarray, "S"]:
+    """Return how large each number of `RobotStates.sensors` can be, of any robot.
+
+    S is the largest number that a kind has; robots that have fewer are padded by zeros.
+    """
+    most = np.zeros(max((kind.model.nsensordata for kind in kinds), default=0))
+    for kind in kinds:
+        width = kind.model.nsensordata
+        most[:width] = np.maximum(most[:width], kind.sensor_limits)
+    return most
 
 
 def make_pilots(
@@ -213,12 +261,16 @@ def add_robots(spec: MjSpec, kinds: Sequence[RobotKind], contype: int, conaffini
     for kind in kinds:
         take_over_settings(spec, kind.spec)
         for i in range(kind.first, kind.first + kind.num_robots):
-            own = kind.spec.copy()
-            added = spec.worldbody.add_frame().attach_body(_base(own), f"r{i}/", "")
+            added = _attached(spec, kind.spec.copy(), i)
             for geom in added.find_all("geom"):
                 if geom.contype or geom.conaffinity:
                     geom.contype = contype
                     geom.conaffinity = conaffinity
+
+
+def _attached(spec: MjSpec, own: MjSpec, i: int) -> MjsBody:
+    """Attach a robot, with what refers to its parts alone, as `r{i}/`; return its base there."""
+    return spec.worldbody.add_frame().attach_body(_base(own), f"r{i}/", "")
 
 
 def pose_of(
@@ -272,7 +324,7 @@ def _base(spec: MjSpec) -> MjsBody:
 
 def _check(kind: str, spec: MjSpec, model: MjModel) -> None:
     """Raise ValueError for a model that cannot be one robot of a team."""
-    said = _fault_of_base(spec, model) or _fault_of_parts(model)
+    said = _fault_of_base(spec, model) or _fault_of_parts(model) or _fault_of_sensors(spec, model)
     if said:
         raise ValueError(f"robot {kind}: {said}")
 
@@ -308,6 +360,22 @@ def _fault_of_parts(model: MjModel) -> str:
     if model.neq + model.ntendon > 0:
         return "it has equalities or tendons, which are not supported"
     return ""
+
+
+def _fault_of_sensors(spec: MjSpec, model: MjModel) -> str:
+    """Return what is wrong with a model's sensors; nothing if it is right."""
+    if model.nsensor == 0:
+        return ""
+    scene = MjSpec()
+    own = spec.copy()
+    take_over_settings(scene, own)
+    _attached(scene, own, 0)
+    if scene.compile().nsensordata == model.nsensordata:
+        return ""
+    return (
+        "it has a sensor of what is not in its body, which stays out of the scene; leave that "
+        "sensor out"
+    )
 
 
 def _is_at_origin(model: MjModel) -> bool:

@@ -24,6 +24,8 @@ class RobotStates:
     attitude: Float[np.ndarray, "B N 4"] | None = None  # quaternions of bodies; None: points
     has_crashed: Bool[np.ndarray, "B N"] | None = None  # bodies that touched anything in flight
     observed_m: Float[np.ndarray, "B N D"] | None = None  # own position, with its error [m]
+    # Of the models' sensors, in MuJoCo's units; `physics.robots.sensor_columns` has their names.
+    sensors: Float[np.ndarray, "B N S"] | None = None  # None: no robot has any
 
     @property
     def own_m(self) -> Float[np.ndarray, "B N D"]:

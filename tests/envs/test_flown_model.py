@@ -7,6 +7,7 @@ import pytest
 import torch
 from sb3_contrib import QRDQN, MaskablePPO, RecurrentPPO
 from sb3_contrib.common.maskable.evaluation import evaluate_policy
+from scanners import SCANNERS
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecNormalize
@@ -195,6 +196,7 @@ def test_it_changes_as_its_model_learns():
         (lambda: PPO("MultiInputPolicy", SwarmEnv(**SMALL)), "trained on another environment"),
         (lambda: PPO("MlpPolicy", "CartPole-v1"), "trained on another environment"),
         (lambda: PPO("MultiInputPolicy", team(agent="team")), "decides for one robot"),
+        (lambda: PPO("MultiInputPolicy", team(with_sensors=True, **SCANNERS)), "sees sensors, too"),
         (lambda: RecurrentPPO("MultiInputLstmPolicy", team()), "RecurrentPPO remembers what it"),
         (lambda: QRDQN("MultiInputPolicy", team(), buffer_size=9), "QRDQN has neither"),
     ],

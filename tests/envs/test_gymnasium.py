@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import check_env
 from gymnasium.wrappers import TimeAwareObservation
+from scanners import SCANNERS
 
 from swarm_mj.envs import register_environments
 from swarm_mj.envs.gymnasium import HEIGHT, WIDTH, Screen, SwarmEnv
@@ -31,6 +32,7 @@ SMALL = {"num_robots": 5, "num_windows": 8, "range_ratio": 0.4}
         ("RandomWalk", {"features": "paper", "with_parents": True}),
         ("Flocking", {"preset": "reference", "features": "reference"}),
         ("Flocking", {"robot": "quadrotor"}),
+        ("RandomWalk", {"with_sensors": True, **SCANNERS}),
     ],
 )
 @pytest.mark.usefixtures("opengl")

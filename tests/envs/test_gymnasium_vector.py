@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 from gymnasium.utils.env_checker import data_equivalence
 from gymnasium.vector import AutoresetMode, SyncVectorEnv
+from scanners import SCANNERS
 
 from swarm_mj.envs import register_environments
 from swarm_mj.envs.gymnasium import SwarmEnv
@@ -17,9 +18,10 @@ NUM_ENVS = 3
 EVERY_MODE = pytest.mark.parametrize("mode", list(AutoresetMode))
 
 
-def both(mode):
-    ours = SwarmVectorEnv(NUM_ENVS, "random-walk", autoreset_mode=mode, **SMALL)
-    makes = [lambda: SwarmEnv("random-walk", **SMALL)] * NUM_ENVS
+def both(mode, **options):
+    options = {**SMALL, **options}
+    ours = SwarmVectorEnv(NUM_ENVS, "random-walk", autoreset_mode=mode, **options)
+    makes = [lambda: SwarmEnv("random-walk", **options)] * NUM_ENVS
     return ours, SyncVectorEnv(makes, autoreset_mode=mode)
 
 
@@ -182,3 +184,12 @@ def test_own_features_may_write_into_the_same_array_again(tmp_path, monkeypatch)
     before = copy.deepcopy(held)
     env.step(actions(1)[0])
     same(held, before)
+
+
+def test_robots_sense_alike_beside_other_missions():
+    ours, theirs = both(AutoresetMode.NEXT_STEP, with_sensors=True, **SCANNERS)
+    seen = ours.reset(seed=1)[0]
+    same(seen, theirs.reset(seed=1)[0])
+    assert seen["sensors"].shape == (NUM_ENVS, 5, 14)
+    for action in actions(3):
+        same(ours.step(action)[0], theirs.step(action)[0])

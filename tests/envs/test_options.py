@@ -9,6 +9,7 @@ import gymnasium
 import numpy as np
 import pytest
 from gymnasium import spaces
+from scanners import SCANNERS
 
 from swarm_mj.envs import environment_id, register_environments
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
@@ -35,6 +36,12 @@ REFUSED = {
     ),
     "argument 'mask'; did you mean reset_mask": lambda: SwarmVectorEnv(2, **SMALL).reset(**RESET),
     "number of missions must be 1 or more, not 0": lambda: SwarmVectorEnv(0, **SMALL),
+    "with_sensors needs robots with sensors, and robot point has none": lambda: make_batch(
+        with_sensors=True, **SMALL
+    ),
+    "and robot quadrotor has none; choose an MJCF file": lambda: make_batch(
+        with_sensors=True, robot="quadrotor", **SMALL
+    ),
     "'Same' is not a valid AutoresetMode": lambda: SwarmVectorEnv(
         1, autoreset_mode="Same", **SMALL
     ),
@@ -102,6 +109,29 @@ def test_a_robot_sees_a_row_of_what_the_team_sees():
     now = {name: each[0] for name, each in team.observation.items()}
     assert now in all_seen
     assert {name: each[2] for name, each in now.items()} in seen
+
+
+def test_sensors_are_seen_in_their_units_within_their_cutoffs():
+    """The accelerometer's 16 g, the gyro's 2000 degrees a second, the rangefinders' 20 m."""
+    team = make_batch("random-walk", 2, with_sensors=True, arena="forest", **SCANNERS, **SMALL)
+    plain = make_batch("random-walk", 2, arena="forest", **SCANNERS, **SMALL)
+    seen, _ = robot_spaces(team)
+    assert isinstance(seen, spaces.Dict)
+    assert seen["sensors"].dtype == np.float32
+    most = [16.0 * 9.81] * 3 + [np.radians(2000.0)] * 3 + [20.0] * 8
+    np.testing.assert_allclose(seen["sensors"].high, most, rtol=1e-3)
+    np.testing.assert_allclose(seen["sensors"].low, np.negative(most), rtol=1e-3)
+    for batch in (team, plain):
+        batch.restart([1, 2])
+        batch.step(np.zeros((2, 3), dtype=np.int64))
+    shown = team.observation
+    np.testing.assert_array_equal(shown["sensors"], team.flown.states.sensors.astype(np.float32))
+    assert {name: each[1, 2] for name, each in shown.items()} in seen
+    assert {name: each[1] for name, each in shown.items()} in team_spaces(team)[0]
+    del shown["sensors"]
+    for name, each in plain.observation.items():
+        np.testing.assert_array_equal(shown.pop(name), each)
+    assert not shown
 
 
 def test_the_documentation_names_the_columns_in_order():

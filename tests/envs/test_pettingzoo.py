@@ -5,6 +5,7 @@ import pytest
 import supersuit
 from gymnasium import spaces
 from pettingzoo.test import parallel_api_test, parallel_seed_test
+from scanners import SCANNERS
 from stable_baselines3 import PPO
 
 from swarm_mj.envs.pettingzoo import parallel_env
@@ -16,7 +17,13 @@ FAILING = {**SMALL, "failure_fraction": 0.3}  # 2 of 6, at the start of the 7th 
 
 
 @pytest.mark.parametrize(
-    "options", [SMALL, {**FAILING, "with_parents": True}, {**FAILING, "reward": "credit"}]
+    "options",
+    [
+        SMALL,
+        {**FAILING, "with_parents": True},
+        {**FAILING, "reward": "credit"},
+        {**FAILING, **SCANNERS, "with_sensors": True},
+    ],
 )
 def test_pettingzoos_own_checks(options):
     with warnings.catch_warnings():

@@ -7,6 +7,7 @@ import pytest
 import torch
 from safetensors import safe_open
 from sb3_contrib import MaskablePPO, RecurrentPPO
+from scanners import SCANNERS
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.torch_layers import CombinedExtractor
 from stable_baselines3.common.vec_env import VecMonitor, VecNormalize
@@ -153,6 +154,10 @@ class Halved(CombinedExtractor):
         (
             lambda: trained(PPO, make_vec_env(with_parents=True, **SMALL)),
             r"sees no parents; .*Flown\(model\)",
+        ),
+        (
+            lambda: trained(PPO, make_vec_env(with_sensors=True, **SCANNERS, **SMALL)),
+            "this model sees sensors, too; fly it in its environment, or train without",
         ),
         (
             lambda: trained(PPO, VecNormalize(make_vec_env(**SMALL))),

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scanners import SCANNERS
 
 from swarm_mj import make_policy, paper
 from swarm_mj.physics.bodies import BodyWorlds
@@ -340,3 +341,168 @@ def test_packets_take_the_distance_in_space():
     for height_m, heard in ((20.0, 0), (120.0, 1)):
         position_m = np.array([[[0.0, 0.0, 20.0], [240.0, 0.0, height_m]]])
         assert radio(position_m, sends)[0, 1] == heard
+
+
+FEELER = """
+<mujoco>
+  <option timestep="0.005"/>
+  <worldbody>
+    <body name="base">
+      <freejoint/><geom type="box" size="0.2 0.2 0.2" mass="1"/><site name="s"/>
+      <site name="east" zaxis="1 0 0"/><site name="west" zaxis="-1 0 0"/>
+      <site name="down" zaxis="0 0 -1"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>
+  <sensor>
+    <rangefinder name="up" site="s"/>
+    <rangefinder name="down" site="down"/>
+    <rangefinder name="east" site="east"/>
+    <rangefinder name="west" site="west" cutoff="20"/>
+    <rangefinder name="near" site="s" cutoff="0.5"/>
+    <gyro name="gyro" site="s"/>
+    <accelerometer name="felt" site="s"/>
+  </sensor>
+</mujoco>
+"""
+UP, DOWN, EAST, WEST, NEAR = range(5)
+
+
+@pytest.fixture
+def feeler(tmp_path):
+    path = tmp_path / "feeler.xml"
+    path.write_text(FEELER)
+    return str(path)
+
+
+def placed(mission, position_m, pilot, **options):
+    """Worlds that begin at rest, at these places of the first mission and of all others."""
+    worlds = BodyWorlds(mission, 2, pilot=pilot, **options)
+    worlds.start([np.random.default_rng(b) for b in range(2)])
+    position_m = np.broadcast_to(position_m, (2, mission.num_robots, 3)).copy()
+    worlds.place(position_m, np.zeros_like(position_m))
+    return worlds
+
+
+@pytest.mark.parametrize(
+    ("arena", "place_m", "east_m", "west_m"),
+    [
+        # Blocks of 110 m stand at every 200 m, one of them in the middle, up to 10 m.
+        ("blocks", (60.0, 10.0, 4.0), 145.0 - 60.0, 60.0 - 55.0),
+        ("blocks", (80.0, 10.0, 4.0), 145.0 - 80.0, 20.0),  # at 25 m, over its cutoff
+        ("blocks", (80.0, 10.0, 11.0), None, -1.0),  # over the roofs, where it sees nothing
+        # The first tree, of a radius of 6 m, is at x = 0, y = (1/3 - 1/2) 1 km.
+        ("forest", (10.0, -1000.0 / 6.0, 4.0), None, 4.0),
+    ],
+)
+def test_ranges_are_those_to_walls_trees_and_the_floor(feeler, arena, place_m, east_m, west_m):
+    mission = paper("stationary", robot=feeler, num_robots=40, arena=arena)
+    others_m = np.column_stack(
+        [np.linspace(-400.0, 400.0, 40), np.full(40, 499.0), np.full(40, 90)]
+    )
+    others_m[0] = place_m
+    worlds = placed(mission, others_m, Resting())
+    sensed = worlds.states.sensors[:, 0]
+    np.testing.assert_allclose(sensed[:, DOWN], place_m[2], rtol=1e-12)
+    np.testing.assert_allclose(sensed[:, WEST], west_m, rtol=1e-9)
+    np.testing.assert_allclose(sensed[:, UP], -1.0)  # MuJoCo's word for nothing, which a
+    np.testing.assert_allclose(sensed[:, NEAR], -0.5)  # cutoff of less than 1 m cuts off, too
+    if east_m is not None:
+        np.testing.assert_allclose(sensed[:, EAST], east_m, rtol=1e-9)
+
+
+def test_robots_see_each_other_but_not_what_is_drawn_transparent(feeler):
+    """The quadrotor's arm ends 0.175 m from its middle; its hull, at 0.27 m, is invisible."""
+    mission = paper("stationary", robot=f"{feeler}:1,quadrotor:1", num_robots=2)
+    worlds = placed(mission, [[0.0, 0.0, 20.0], [5.0, 0.0, 20.0]], Resting())
+    np.testing.assert_allclose(worlds.states.sensors[:, 0, EAST], 5.0 - 0.175, rtol=1e-12)
+
+
+def test_what_hovers_feels_its_weight_and_what_falls_nothing(feeler):
+    mission = paper("stationary", robot=feeler, num_robots=2, height_m=50.0)
+    hovering = flown(mission, [1], 2, pilot=Hovering(_airframe_of(mission)))
+    falling = flown(mission, [1], 1, pilot=Resting())
+    np.testing.assert_allclose(hovering.states.sensors[0, :, 5:8], 0.0, atol=1e-12)
+    np.testing.assert_allclose(hovering.states.sensors[0, :, 8:], [[0, 0, 9.81]] * 2, atol=1e-9)
+    # But for drag, rho v² A / 2, a step before its end.
+    fallen_mps = falling.states.velocity_mps[0, :, 2] + 9.81 * 0.005
+    drag_mps2 = 0.5 * 1.204 * 0.4 * 0.4 * fallen_mps**2
+    np.testing.assert_allclose(falling.states.sensors[0, :, 10], drag_mps2, rtol=0.02)
+    np.testing.assert_allclose(falling.states.sensors[0, :, 8:10], 0.0, atol=1e-12)
+
+
+def test_after_a_window_sensors_are_of_a_step_ago(feeler):
+    """Euler's last step moved the box by v h, h = 5 ms."""
+    mission = paper("stationary", robot=feeler, num_robots=2, height_m=50.0)
+    swarm = flown(mission, [1], 3, pilot=Resting())
+    height_m = swarm.states.position_m[0, :, 2]
+    before_m = height_m - 0.005 * swarm.states.velocity_mps[0, :, 2]
+    np.testing.assert_allclose(swarm.states.sensors[0, :, DOWN], before_m, rtol=1e-12)
+    kept = swarm.states.sensors
+    copied = kept.copy()
+    swarm.step()
+    np.testing.assert_array_equal(kept, copied)
+    assert not np.array_equal(swarm.states.sensors, kept)
+
+
+def test_a_pilot_begins_with_what_sensors_measure_there(feeler):
+    seen = []
+
+    class Looking:
+        def __call__(self, sensed, _wanted, control):
+            assert not sensed.sensors.flags.writeable
+            seen.append(sensed.sensors[0, :, DOWN].copy())
+            control[:] = 0.0
+
+    mission = paper("stationary", robot=feeler, num_robots=2)
+    worlds = placed(mission, [[0.0, 0.0, 20.0], [9.0, 0.0, 30.0]], Looking())
+    higher_m = np.broadcast_to([[0.0, 0.0, 40.0], [9.0, 0.0, 50.0]], (2, 2, 3)).copy()
+    worlds.place(higher_m, np.zeros_like(higher_m))
+    np.testing.assert_allclose(seen, [[20.0, 30.0], [40.0, 50.0]])
+
+
+def test_robots_with_fewer_sensors_have_zeros_behind_their_own(feeler, tmp_path):
+    """Of a rover, which has none, of one whose only sensor is a height, and of one with 11."""
+    path = tmp_path / "low.xml"
+    path.write_text(
+        BOX.replace("</mujoco>", '<sensor><framepos objtype="site" objname="s"/></sensor></mujoco>')
+    )
+    mission = paper("stationary", robot=f"rover:1,{path}:2,{feeler}:1", num_robots=4)
+    places_m = np.array([[-30.0, 0.0, 0.125], [0, 5, 9], [8, 0, 12], [99, 0, 40]])
+    sensed = placed(mission, places_m, Resting()).states.sensors
+    assert sensed.shape == (2, 4, 11)
+    for b in range(2):
+        assert not sensed[b, 0].any()
+        np.testing.assert_allclose(sensed[b, 1:3, :3], places_m[1:3])
+        assert not sensed[b, 1:3, 3:].any()
+        assert sensed[b, 3, DOWN] == pytest.approx(40.0)
+
+
+def test_robots_without_sensors_have_no_numbers_of_them(box):
+    assert Swarm(paper("flocking", num_robots=2), [1]).states.sensors is None
+    assert Swarm(paper("flocking", num_robots=2, robot="quadrotor"), [1]).states.sensors is None
+    assert Swarm(paper(num_robots=2, robot=box), [1], pilot=Resting()).states.sensors is None
+
+
+def test_sensors_are_the_same_in_any_batch():
+    mission = paper(
+        "random-walk", num_robots=8, range_ratio=0.6, arena="forest", robot=SCANNERS["robot"]
+    )
+    alone = flown(mission, [7], 20, pilot=SCANNERS["pilot"])
+    batch = flown(mission, [3, 7, 9], 20, num_threads=2, pilot=SCANNERS["pilot"])
+    np.testing.assert_array_equal(alone.states.sensors[0], batch.states.sensors[1])
+    assert not np.array_equal(batch.states.sensors[0], batch.states.sensors[1])
+
+
+def test_a_controller_sees_sensors_and_cannot_change_them(feeler):
+    seen = []
+
+    def climb(_buffers, states):
+        seen.append(states.sensors[0, :, DOWN].copy())
+        states.sensors[:] = 77.0
+        return np.zeros_like(states.velocity_mps)
+
+    mission = paper("stationary", robot=feeler, num_robots=2, height_m=30.0)
+    swarm = flown(mission, [1], 2, controller=climb, pilot=Hovering(_airframe_of(mission)))
+    np.testing.assert_allclose(seen, 30.0)
+    np.testing.assert_allclose(swarm.states.sensors[0, :, DOWN], 30.0)

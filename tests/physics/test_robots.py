@@ -4,7 +4,14 @@ import pytest
 
 from swarm_mj import paper
 from swarm_mj.physics.pilots import Pilot, QuadrotorPilot, RoverPilot
-from swarm_mj.physics.robots import heading_of, kinds_of, make_pilots, pose_of
+from swarm_mj.physics.robots import (
+    heading_of,
+    kinds_of,
+    make_pilots,
+    pose_of,
+    sensor_columns,
+    sensor_limits,
+)
 from swarm_mj.physics.scene import compose
 from swarm_mj.simulation.swarm import Swarm
 
@@ -15,6 +22,16 @@ PLANAR = (
     '<geom size="0.1" mass="0.2"/><site name="s"/></body>'
 )
 LIFT = '<actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>'
+
+FAR = '<sensor><framepos objtype="site" objname="w"/></sensor>'
+APART = (
+    '<sensor><framepos objtype="site" objname="s" reftype="site" refname="w"/>'
+    '<gyro site="s"/></sensor>'
+)
+SENSORS = (
+    '<sensor><gyro name="turns" site="s"/><rangefinder site="s" cutoff="7"/>'
+    '<touch name="bumper" site="s" cutoff="3"/></sensor>'
+)
 
 
 def mjcf(body=BODY, actuator=LIFT, option='<option timestep="0.002"/>'):
@@ -110,6 +127,8 @@ def test_an_own_pilot_for_one_of_two_shipped_kinds_is_refused():
         (mjcf(option='<option timestep="0.02"/>'), "its timestep must be from 0.0005 to 0.01 s"),
         (mjcf(actuator=LIFT.replace('"s"', '"gone"')), "gone"),
         (mjcf(body=BODY.replace('mass="0.2"', 'mass="nan"')), "nan in mass"),
+        (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + FAR), "sensor of what is not in its"),
+        (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + APART), "sensor of what is not in"),
     ],
 )
 def test_a_file_that_is_no_robot_is_refused_in_a_line(own, text, said):
@@ -178,3 +197,34 @@ def test_robots_collide_by_their_own_geoms_and_masks():
     assert spec.geom("r0/core").contype == 0
     colliding = compose(paper(robot="quadrotor", num_robots=2, collide=True))
     assert colliding.geom("r0/hull").conaffinity == 3
+
+
+def test_each_sensor_has_its_columns_and_its_cutoff(own):
+    """A gyro has three numbers; the rangefinder without a name is in the fourth column."""
+    mission = paper(robot=f"rover:1,{own(mjcf(actuator=LIFT + SENSORS))}:2", num_robots=3)
+    columns = {"turns": slice(0, 3), "bumper": slice(4, 5)}
+    assert sensor_columns(mission) == [{}, columns]
+    kinds = kinds_of(mission)
+    assert kinds[1].airframe(0.002).sensors == columns
+    assert sensor_limits(kinds).tolist() == [np.inf, np.inf, np.inf, 7.0, 3.0]
+    assert sensor_limits(kinds[:1]).size == 0
+    assert sensor_columns(paper(num_robots=3)) == []
+
+
+def test_mujoco_cuts_no_places_off(own):
+    """The segment between two geoms is two places, wherever its length is cut off."""
+    body = BODY.replace("<geom ", '<geom name="g" ').replace(
+        "</body>", '<body pos="0 0 1"><geom name="h" size="0.1" mass="0.1"/></body></body>'
+    )
+    segment = '<sensor><fromto geom1="g" geom2="h" cutoff="3"/></sensor>'
+    kinds = kinds_of(paper(robot=own(mjcf(body=body, actuator=LIFT + segment)), num_robots=2))
+    assert sensor_limits(kinds).tolist() == [np.inf] * 6
+
+
+def test_limits_are_those_of_all_kinds(own, tmp_path):
+    """The first column is a force up to 5 N of one kind, and a range up to 2 m of another."""
+    near = tmp_path / "near.xml"
+    near.write_text(mjcf(actuator=f'{LIFT}<sensor><rangefinder site="s" cutoff="2"/></sensor>'))
+    bumper = '<sensor><touch site="s" cutoff="5"/><touch site="s" cutoff="1"/></sensor>'
+    mission = paper(robot=f"{own(mjcf(actuator=LIFT + bumper))}:1,{near}:1", num_robots=2)
+    assert sensor_limits(kinds_of(mission)).tolist() == [5.0, 1.0]
