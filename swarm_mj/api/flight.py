@@ -147,6 +147,7 @@ def fly_mission(
     numbers["heard_share"] = _heard_share(swarm)
     numbers["strayed"] = _num_strayed(swarm)
     numbers["crashed"] = _num_crashed(swarm)
+    numbers |= _energy(swarm)
     run = Run(
         mission=mission,
         config=flight.config(),
@@ -253,6 +254,14 @@ def _num_crashed(swarm: Swarm) -> int | None:
     """Return how many robots crashed; None where they are points."""
     has_crashed = swarm.states.has_crashed
     return None if has_crashed is None else int(np.sum(has_crashed))
+
+
+def _energy(swarm: Swarm) -> dict[str, float | None]:
+    """Return the robots' energy, mean and most; None where they are points or do not say [J]."""
+    energy_j = swarm.states.energy_j
+    if energy_j is None or np.any(np.isnan(energy_j)):
+        return {"energy_mean_j": None, "energy_worst_j": None}
+    return {"energy_mean_j": float(np.mean(energy_j)), "energy_worst_j": float(np.max(energy_j))}
 
 
 def _num_strayed(swarm: Swarm) -> int:

@@ -30,6 +30,8 @@ class FlightSummary(dict[str, Any], FlownCosts[float, int, float | None, int | N
     strayed: int  # robots that are on and out of everyone's range at the end
     crashed: int | None  # robots with bodies that crashed; None: they are points
     heard_share: float  # pairs of active robots that had heard of each other at the end [1]
+    energy_mean_j: float | None  # of a robot [J]; None: points, or models that do not say
+    energy_worst_j: float | None  # of the robot that used most [J]; likewise
 
     def __post_init__(self) -> None:
         """Make each attribute a key."""

@@ -65,7 +65,7 @@ def flight_title(mission: Mission, policy: str, seed: int) -> str:
 
 
 def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
-    """Return the rows of a flight's table, at most 16.
+    """Return the rows of a flight's table.
 
     Args:
         mission: What was flown.
@@ -99,6 +99,10 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     if summary.crashed is not None:
         rows["robots crashed"] = (
             f"{summary.crashed}; off from then on" if summary.crashed else "none"
+        )
+    if summary.energy_mean_j is not None:
+        rows["energy per robot; most"] = (
+            f"{summary.energy_mean_j:,.0f} J; {summary.energy_worst_j:,.0f} J"
         )
     if mission.num_failures:
         rows["robots switched off half-way"] = f"{mission.num_failures}; not counted from then on"

@@ -49,6 +49,7 @@ class Moment:
     now: Float[np.ndarray, "B"]  # t [windows]
     is_active: Bool[np.ndarray, "B N"]
     has_crashed: Bool[np.ndarray, "B N"] | None  # None: robots are points
+    energy_j: Float[np.ndarray, "B N"] | None  # that each has used so far [J]; likewise
     position_m: Float[np.ndarray, "B N D"]
     range_m: float  # of a packet in silence
     is_steady: bool  # whether the window is of the second half
@@ -84,6 +85,20 @@ class Moment:
         if self.has_crashed is None:
             return np.full(len(self.now), np.nan)
         return np.sum(self.has_crashed, axis=1).astype(float)
+
+    @property
+    def energy_per_robot_j(self) -> Float[np.ndarray, "B"]:
+        """The energy that robots have used on average [J]; nan where that is not known."""
+        if self.energy_j is None:
+            return np.full(len(self.now), np.nan)
+        return np.mean(self.energy_j, axis=1)
+
+    @property
+    def most_energy_j(self) -> Float[np.ndarray, "B"]:
+        """The energy of the robot that has used most [J]; nan where that is not known."""
+        if self.energy_j is None:
+            return np.full(len(self.now), np.nan)
+        return np.max(self.energy_j, axis=1)
 
 
 Value = TypeVar("Value")  # one number a mission
@@ -174,6 +189,10 @@ class BatchCosts:
     strayed: Float[np.ndarray, "B"] = _last(lambda at: at.strayed)
     # Robots with bodies that crashed; nan: they are points.
     crashed: Float[np.ndarray, "B"] = _last(lambda at: at.crashed)
+    # Energy of a robot with a body in the whole mission [J]; nan: not known, or they are points.
+    energy_j: Float[np.ndarray, "B"] = _last(lambda at: at.energy_per_robot_j)
+    # As above, of the robot that used most.
+    most_energy_j: Float[np.ndarray, "B"] = _last(lambda at: at.most_energy_j)
     # Requests or broadcasts.
     packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.packets.sent)
     # All that were on the air, responses too.
@@ -276,6 +295,7 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
             now=now,
             is_active=is_active,
             has_crashed=states.has_crashed,
+            energy_j=states.energy_j,
             position_m=states.position_m,
             range_m=mission.range_m,
             is_steady=bool(now[0] > num_early),

@@ -204,6 +204,16 @@ class Measurements:
         """The robots of each mission that crashed; empty where robots are points."""
         return Sample(self.costs.crashed if self.mission.has_bodies else np.empty(0))
 
+    @property
+    def energy_j(self) -> Sample:
+        """The energy of a robot in each mission; nan where that is not known."""
+        return Sample(self.costs.energy_j)
+
+    @property
+    def most_energy_j(self) -> Sample:
+        """The energy of the robot that used most in each mission; nan where that is not known."""
+        return Sample(self.costs.most_energy_j)
+
     # The paper's own.
 
     def published_mean(self, cost: MissionCost) -> float | None:

@@ -149,6 +149,9 @@ class Result:
     # Robots with bodies that crashed in a mission.
     crashed_mean: float | None = later_column(lambda own: own.crashed.mean, older=None)
     crashed_worst: float | None = later_column(lambda own: own.crashed.worst, older=None)
+    # Energy of a robot with a body in a mission [J], and of the one that used most in any.
+    energy_mean_j: float | None = later_column(lambda own: own.energy_j.mean, older=None)
+    energy_worst_j: float | None = later_column(lambda own: own.most_energy_j.worst, older=None)
 
     # Differences are this policy's minus the baseline's, on the same missions.
     baseline: str = column(lambda own: own.baseline)

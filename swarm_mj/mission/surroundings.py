@@ -66,7 +66,7 @@ class Surroundings:
     )
     antenna_height_m: float = setting(
         1.0,
-        "above the floor, for two-ray",
+        "of points, above the floor, for two-ray",
         label="antenna height",
         unit="m",
         low=0.1,

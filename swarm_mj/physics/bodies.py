@@ -20,6 +20,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, Stream, normal
 from swarm_mj.mission.bodies import LEAST_HEIGHT_M
 from swarm_mj.mission.faults import MIN_SURVIVORS
+from swarm_mj.physics.energy import Motors, motors_of, use_energy
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
 from swarm_mj.physics.robots import (
@@ -33,7 +34,7 @@ from swarm_mj.physics.robots import (
     make_pilots,
     sensor_limits,
 )
-from swarm_mj.physics.scene import Scene, compiled_scene, compose, num_body_steps
+from swarm_mj.physics.scene import AIR_DENSITY, Scene, compiled_scene, compose, num_body_steps
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import check_accelerations
 from swarm_mj.system.compiled import compiled
@@ -55,8 +56,12 @@ class _Flown(NamedTuple):
     ctrl: Float[np.ndarray, "B n U"]
     push: Float[np.ndarray, "B n V"]  # forces of contacts
     sensors: Float[np.ndarray, "B n S"]
+    force: Float[np.ndarray, "B n U"]  # of motors
+    speed: Float[np.ndarray, "B n U"]  # of what they move
     wanted: SetPoint
     has_crashed: Bool[np.ndarray, "B n"]
+    energy_j: Float[np.ndarray, "B n"]
+    motors: Motors | None  # None: the model does not say what they use
     is_trusted: bool  # the pilot is the package's own
     free: Sensed | None  # views of a free base's states; None: its base is on a plane
 
@@ -66,7 +71,7 @@ class BodyWorlds:
 
     Attributes:
         states: Where the robots are [m], [B N 3], how fast [m/s], their attitude, who is active,
-            and what their sensors measured.
+            what their sensors measured, and the energy that they have used [J].
         obstacles: What stands in the scene; None: nothing.
         reach_m: How far from its base a robot collides, [N].
     """
@@ -104,11 +109,13 @@ class BodyWorlds:
         self._act = self._batch.bind("act")
         self._wind = self._batch.expand("opt.wind") if _has_wind(mission) else None
         self._num_steps = num_body_steps(mission, kinds)
-        pilots = make_pilots(kinds, mission.window_s / self._num_steps, pilot)
+        self._step_s = mission.window_s / self._num_steps
+        pilots = make_pilots(kinds, self._step_s, pilot)
         shape = (num_missions, mission.num_robots)
         self._wanted_mps = np.zeros((*shape, 3))
         self._height_m = np.zeros(shape)
         self._has_crashed = np.zeros(shape, dtype=np.bool_)
+        self._energy_j = np.zeros(shape)
         self.reach_m = np.concatenate([np.full(kind.num_robots, kind.reach_m) for kind in kinds])
         self._works: np.ndarray | None = None  # who was not made to fail
         self._flown = self._divide(kinds, pilots)
@@ -123,11 +130,13 @@ class BodyWorlds:
         """Return each kind's part of the arrays, whose robots follow each other."""
         arrays = [self._batch.bind(name) for name in ("qpos", "qvel", "ctrl")]
         arrays += [self._batch.bind("qfrc_constraint"), self._batch.bind("sensordata")]
+        arrays += [self._batch.bind("actuator_force"), self._batch.bind("actuator_velocity")]
         starts = [0] * len(arrays)
         found = []
         for kind, pilot in zip(kinds, pilots, strict=True):
             model = kind.model
             widths = (model.nq, model.nv, model.nu, model.nv, model.nsensordata)
+            widths += (model.nu, model.nu)
             parts = []
             for a, (array, width) in enumerate(zip(arrays, widths, strict=True)):
                 after = starts[a] + kind.num_robots * width
@@ -136,7 +145,7 @@ class BodyWorlds:
                 starts[a] = after
             robots = slice(kind.first, kind.first + kind.num_robots)
             wanted = SetPoint(_seen(self._wanted_mps[:, robots]), _seen(self._height_m[:, robots]))
-            qpos, qvel, ctrl, push, sensors = parts
+            qpos, qvel, ctrl, push, sensors, force, speed = parts
             flown = _Flown(
                 kind=kind,
                 pilot=pilot,
@@ -146,8 +155,12 @@ class BodyWorlds:
                 ctrl=ctrl,
                 push=push,
                 sensors=sensors,
+                force=force,
+                speed=speed,
                 wanted=wanted,
                 has_crashed=self._has_crashed[:, robots],
+                energy_j=self._energy_j[:, robots],
+                motors=motors_of(kind.is_motor, kind.declared, self._step_s, AIR_DENSITY),
                 is_trusted=is_ours(pilot),
                 free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )
@@ -237,6 +250,7 @@ class BodyWorlds:
         self._works = None
         self.states = replace(self.states, is_active=None)
         for flown in self._flown:
+            flown.energy_j[:] = np.nan if flown.motors is None else 0.0
             its_m = position_m[:, flown.robots]
             its_mps = velocity_mps[:, flown.robots]
             if flown.kind.is_free:
@@ -304,6 +318,10 @@ class BodyWorlds:
             self._steer()
             self._batch.step()
             for flown in self._flown:
+                if flown.motors is not None:
+                    use_energy(
+                        flown.motors, flown.force, flown.speed, flown.has_crashed, flown.energy_j
+                    )
                 if flown.kind.is_free:
                     _note_contacts(flown.push, flown.has_crashed)
         self._change_gusts()
@@ -352,6 +370,7 @@ class BodyWorlds:
             attitude=attitude,
             has_crashed=self._has_crashed.copy(),
             sensors=sensors,
+            energy_j=self._energy_j.copy(),
         )
 
 

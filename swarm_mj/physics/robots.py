@@ -14,15 +14,18 @@ from typing import Any, NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
-from mujoco._enums import mjtBias, mjtJoint, mjtSensor
-from mujoco._functions import mj_forward, mj_fullM, mju_sparse2dense
+from mujoco._enums import mjtBias, mjtJoint, mjtObj, mjtSensor
+from mujoco._functions import mj_forward, mj_fullM, mj_name2id, mju_sparse2dense
 from mujoco._specs import MjsBody, MjSpec
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arena_files import read_mjcf, refused, take_over_settings
+from swarm_mj.physics.declarations import Declarations, declared_by
 from swarm_mj.physics.pilots import Airframe, Pilot, QuadrotorPilot, RoverPilot
+from swarm_mj.physics.state import Antennas
 from swarm_mj.system.arguments import check_callable, did_you_mean
+from swarm_mj.system.decibels import from_db
 from swarm_mj.system.packages import asset
 from swarm_mj.system.user_code import make
 
@@ -31,6 +34,9 @@ MOST_STEP_S = 0.01
 FREE_QPOS = 7  # of a free base: a place and a quaternion
 FREE_QVEL = 6  # of a free base: velocity and turn rate
 PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
+ANTENNA = "antenna"  # the site where a model has it
+MOST_ANTENNA_M = 10.0  # above or below the base
+OFF_AXIS_M = 1e-6  # as much as a compiled model rounds by
 
 OwnPilot = Pilot | type | str  # an object, a class that is made for an airframe, or its name
 CALLED_WITH = ("sensed", "wanted", "control")  # a pilot
@@ -59,11 +65,12 @@ class RobotKind:
     num_robots: int
     model: MjModel  # of one robot
     spec: MjSpec
+    declared: Declarations
 
     @property
     def is_free(self) -> bool:
         """True if its base can move and turn in all directions: it flies."""
-        return int(self.model.jnt_type[0]) == int(mjtJoint.mjJNT_FREE)
+        return is_free_base(self.model)
 
     @property
     def step_s(self) -> float:
@@ -75,10 +82,15 @@ class RobotKind:
         """Height of the base over the floor, in the model's own pose."""
         return float(self.model.body_pos[1, 2])
 
+    @property
+    def antenna_m(self) -> float:
+        """Height of the antenna over the base, while the robot is level; 0 without its site."""
+        return float(_antenna_offset_m(self.model)[2])
+
     @cached_property
     def reach_m(self) -> float:
         """Radius of the smallest sphere around the base that holds all that collides."""
-        data = rest_pose(self)
+        data = rest_pose(self.model)
         off_m = np.linalg.norm(data.geom_xpos - data.xpos[1], axis=1) + self.model.geom_rbound
         return float(np.max(off_m[collides(self.model)]))
 
@@ -101,11 +113,15 @@ class RobotKind:
         limit = np.where(is_cut, model.sensor_cutoff, np.inf)
         return np.repeat(limit, model.sensor_dim)
 
+    @property
+    def is_motor(self) -> Bool[np.ndarray, "U"]:
+        """True for actuators whose force is their control times a gain, and nothing else."""
+        return self.model.actuator_biastype == mjtBias.mjBIAS_NONE
+
     def _thrust(self) -> Float[np.ndarray, "U 6"]:
         """Return the force and torque on the base, in its axes, of a control of 1 of each motor."""
         model = self.model
-        data = rest_pose(self)
-        is_motor = model.actuator_biastype == mjtBias.mjBIAS_NONE
+        data = rest_pose(model)
         moment = np.zeros((model.nu, model.nv))
         mju_sparse2dense(
             moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
@@ -113,14 +129,14 @@ class RobotKind:
         effect = np.zeros((model.nu, FREE_QVEL))
         width = min(FREE_QVEL, model.nv) if self.is_free else 0
         effect[:, :width] = moment[:, :width] * model.actuator_gainprm[:, :1]
-        effect[~is_motor] = 0.0
+        effect[~self.is_motor] = 0.0
         return effect
 
     def _inertia_kgm2(self) -> Float[np.ndarray, "3"]:
         """Return the inertia of the whole robot about the axes of its base, joints at rest."""
         model = self.model
         full = np.zeros((model.nv, model.nv))
-        mj_fullM(model, rest_pose(self), full)
+        mj_fullM(model, rest_pose(model), full)
         diagonal = np.diag(full)
         if self.is_free:
             return diagonal[3:FREE_QVEL].copy()
@@ -149,13 +165,48 @@ def collides(model: MjModel) -> Bool[np.ndarray, "G"]:
     return has_mask & (model.geom_bodyid > 0)
 
 
-def rest_pose(kind: RobotKind) -> MjData:
+def rest_pose(model: MjModel) -> MjData:
     """Return a robot whose base is level at the origin, or on its plane, all other joints at 0."""
-    data = MjData(kind.model)
-    if kind.is_free:
+    data = MjData(model)
+    if is_free_base(model):
         data.qpos[:FREE_QPOS] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    mj_forward(kind.model, data)
+    mj_forward(model, data)
     return data
+
+
+def is_free_base(model: MjModel) -> bool:
+    """Return whether a robot's base can move and turn in all directions: it flies."""
+    return int(model.jnt_type[0]) == int(mjtJoint.mjJNT_FREE)
+
+
+def antennas_of(mission: Mission) -> Antennas | None:
+    """Return the antennas of a mission's robots.
+
+    Args:
+        mission: Whose robots' models are read.
+
+    Returns:
+        Heights and gains; None of points, and where no model declares anything.
+
+    Raises:
+        ValueError: A model is refused.
+    """
+    if not mission.has_bodies:
+        return None
+    height_m: list[float] = []
+    gain_db: list[float] = []
+    power_db: list[float] = []
+    for kind in kinds_of(mission):
+        height_m += [kind.antenna_m] * kind.num_robots
+        gain_db += [kind.declared.antenna_gain_dbi] * kind.num_robots
+        power_db += [kind.declared.power_class_db] * kind.num_robots
+    if not any(height_m) and not any(gain_db) and not any(power_db):
+        return None
+    return Antennas(
+        height_m=np.array(height_m),
+        gain=from_db(np.array(gain_db)),
+        power=from_db(np.array(power_db)),
+    )
 
 
 def kinds_of(mission: Mission) -> list[RobotKind]:
@@ -168,7 +219,12 @@ def kinds_of(mission: Mission) -> list[RobotKind]:
         _check(group.kind, spec, model)
         num_robots = group.num_robots
         kind = RobotKind(
-            name=group.kind, first=first, num_robots=num_robots, model=model, spec=spec
+            name=group.kind,
+            first=first,
+            num_robots=num_robots,
+            model=model,
+            spec=spec,
+            declared=_declared(group.kind, model),
         )
         found.append(kind)
         first += num_robots
@@ -317,6 +373,17 @@ def _compiled(kind: str, spec: MjSpec) -> MjModel:
         raise refused("robot", kind, error) from error
 
 
+def _declared(kind: str, model: MjModel) -> Declarations:
+    numerics: dict[str, np.ndarray] = {}
+    for n in range(model.nnumeric):
+        numeric = model.numeric(n)
+        numerics[numeric.name] = numeric.data
+    try:
+        return declared_by(numerics)
+    except ValueError as error:
+        raise refused("robot", kind, error) from error
+
+
 def _base(spec: MjSpec) -> MjsBody:
     """Return the one body that stands in the world."""
     return spec.worldbody.first_body()
@@ -359,7 +426,27 @@ def _fault_of_parts(model: MjModel) -> str:
         return f"its timestep must be {limits}, not {step_s:g}; give <option timestep/>"
     if model.neq + model.ntendon > 0:
         return "it has equalities or tendons, which are not supported"
-    return ""
+    return _fault_of_antenna(model)
+
+
+def _fault_of_antenna(model: MjModel) -> str:
+    """Return what is wrong with where the antenna is; nothing if it is right."""
+    x_m, y_m, z_m = _antenna_offset_m(model).tolist()
+    if max(abs(x_m), abs(y_m)) <= OFF_AXIS_M and abs(z_m) <= MOST_ANTENNA_M:
+        return ""
+    return (
+        f"its antenna must be right above or below its base, at most {MOST_ANTENNA_M:g} m away, "
+        f'not at ({x_m:g}, {y_m:g}, {z_m:g}) m from it; give the site pos="0 0 HEIGHT"'
+    )
+
+
+def _antenna_offset_m(model: MjModel) -> Float[np.ndarray, "3"]:
+    """Return the antenna's place from the base, in a robot at rest; 0 without such a site [m]."""
+    site = mj_name2id(model, mjtObj.mjOBJ_SITE, ANTENNA)
+    if site < 0:
+        return np.zeros(3)
+    data = rest_pose(model)
+    return data.site_xpos[site] - data.xpos[1]
 
 
 def _fault_of_sensors(spec: MjSpec, model: MjModel) -> str:
@@ -380,7 +467,7 @@ def _fault_of_sensors(spec: MjSpec, model: MjModel) -> str:
 
 def _is_at_origin(model: MjModel) -> bool:
     """Return whether a planar base has the coordinates that its joints have; a free one may not."""
-    if int(model.jnt_type[0]) == int(mjtJoint.mjJNT_FREE):
+    if is_free_base(model):
         return True
     is_level = np.allclose(model.body_quat[1], [1.0, 0.0, 0.0, 0.0])
     is_central = not np.any(model.body_pos[1, :2]) and not np.any(model.jnt_pos[:3])

@@ -26,11 +26,27 @@ class RobotStates:
     observed_m: Float[np.ndarray, "B N D"] | None = None  # own position, with its error [m]
     # Of the models' sensors, in MuJoCo's units; `physics.robots.sensor_columns` has their names.
     sensors: Float[np.ndarray, "B N S"] | None = None  # None: no robot has any
+    # What bodies have used so far, nan where their models do not say [J]; None: points.
+    energy_j: Float[np.ndarray, "B N"] | None = None
 
     @property
     def own_m(self) -> Float[np.ndarray, "B N D"]:
         """Where each robot observes itself to be: exactly at p unless it errs [m]."""
         return self.position_m if self.observed_m is None else self.observed_m
+
+
+class Antennas(NamedTuple):
+    """The antennas of robots with bodies, in the order of their numbers; gains are linear."""
+
+    height_m: Float[np.ndarray, "N"]  # above the robot's base
+    gain: Float[np.ndarray, "N"]  # of what a robot sends and of what it receives [1]
+    power: Float[np.ndarray, "N"]  # that a robot sends, over the mission's [1]
+
+    @property
+    def are_alike(self) -> bool:
+        """True if all are equally high and none has a gain: in free space they change nothing."""
+        has_gain = np.any(self.gain != 1.0) or np.any(self.power != 1.0)
+        return not has_gain and not np.any(self.height_m != self.height_m[0])
 
 
 class Obstacles(NamedTuple):

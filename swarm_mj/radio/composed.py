@@ -75,6 +75,14 @@ class ComposedChannel:
         self._shadowing_db = shadowing_db
         self._shadowing_distance_m = shadowing_distance_m
 
+    @property
+    def at_1_m_mw(self) -> Float[np.ndarray, "N N"]:
+        """The power of each robot's packets at each other after one metre of free space [mW]."""
+        sent_mw = self._law.at_1_m[:, np.newaxis]
+        antennas = self._law.antennas
+        gain = np.ones(len(sent_mw)) if antennas is None else antennas.gain
+        return sent_mw * gain
+
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Start new missions; one generator each, from which its own shadowing is drawn, too."""
         self.key = np.array([rng.integers(2**64, dtype=np.uint64) for rng in rngs])

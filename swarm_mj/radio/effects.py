@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.state import Obstacles
+from swarm_mj.physics.state import Antennas, Obstacles
 from swarm_mj.radio.composed import Reception
 from swarm_mj.radio.effect import ChannelModel, Effect, MissionEffect, titled
 from swarm_mj.radio.fading import NO_LINE_OF_SIGHT
@@ -33,13 +33,14 @@ class PathLoss(
 
     `log-distance`: 10 n dB for every tenfold distance beyond the reference distance. `two-ray`: 40
     dB per decade beyond the crossover distance, as the reflection from the ground nearly cancels
-    the direct ray (both: Rappaport 2002).
+    the direct ray (both: Rappaport 2002); robots with bodies have antennas at their own heights.
     """
 
     # To add a law, name it in `PathLossLaw` and its parameters in `mission.surroundings`; here it
     # gets a case.
     breakpoint_m: float  # up to which free space holds
     exponent: float  # n, beyond it: tenfold distance costs 10 n dB
+    is_by_height: bool = False  # whether both antennas' heights [m] multiply the breakpoint
 
     @classmethod
     def of(cls, mission: Mission) -> "PathLoss | None":
@@ -58,6 +59,13 @@ class PathLoss(
                     breakpoint_m=mission.reference_m,
                     exponent=mission.loss_exponent,
                 )
+            case "two-ray" if mission.has_bodies:
+                return cls(
+                    title=titled(path_loss=law),
+                    breakpoint_m=two_ray_breakpoint_m(1.0, mission.frequency_hz),
+                    exponent=TWO_RAY_EXPONENT,
+                    is_by_height=True,
+                )
             case "two-ray":
                 height_m = mission.antenna_height_m
                 return cls(
@@ -70,7 +78,11 @@ class PathLoss(
 
     def change(self, model: ChannelModel) -> ChannelModel:
         """Return a channel whose mean powers follow this law."""
-        law = model.law._replace(breakpoint_m=self.breakpoint_m, exponent=self.exponent)
+        law = model.law._replace(
+            breakpoint_m=self.breakpoint_m,
+            exponent=self.exponent,
+            is_by_height=self.is_by_height,
+        )
         return model._replace(law=law)
 
 
@@ -256,6 +268,22 @@ class Obstruction(Effect):
     def change(self, model: ChannelModel) -> ChannelModel:
         """Return a channel between these obstacles."""
         return model._replace(law=model.law._replace(obstacles=self.obstacles))
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class BodyAntennas(Effect):
+    """Robots with bodies have antennas above their bases, with gains, and powers of their own.
+
+    They come from the robots' models, not from numbers of the mission.
+    """
+
+    antennas: Antennas
+
+    def change(self, model: ChannelModel) -> ChannelModel:
+        """Return a channel between these antennas."""
+        antennas = self.antennas
+        at_1_m = model.law.at_1_m * antennas.power * antennas.gain
+        return model._replace(law=model.law._replace(at_1_m=at_1_m, antennas=antennas))
 
 
 # In the order of the titles. A test finds an effect that is left out.

@@ -13,8 +13,8 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.radio.composed import ComposedChannel
-from swarm_mj.radio.effects import model_of
-from swarm_mj.radio.mission_radio import radio_of
+from swarm_mj.radio.effects import BodyAntennas, model_of
+from swarm_mj.radio.mission_radio import radio_of, team_antennas
 from swarm_mj.radio.reception import MIN_DISTANCE_M
 from swarm_mj.system.decibels import from_db, to_db
 from swarm_mj.system.reading import open_file
@@ -32,16 +32,20 @@ class GainTable(ComposedChannel):
         """Read a table.
 
         Args:
-            mission: Whose transmit power, noise, SINR threshold and half duplex it has.
+            mission: Whose transmit power, noise, SINR threshold and half duplex it has, and the
+                antennas of whose robots add their own gains.
             path: A CSV file: two places [m] and the gain between them [dB] in each row.
 
         Raises:
-            ValueError: There is no such file, or it is no such table.
+            ValueError: There is no such file, it is no such table, or the model of a robot is
+                refused.
         """
         from scipy.spatial import KDTree  # slow to import
 
         radio = radio_of(mission)
-        model = model_of(radio, mission.num_robots, effects=[])
+        antennas = team_antennas(mission)
+        effects = [] if antennas is None else [BodyAntennas(antennas=antennas)]
+        model = model_of(radio, mission.num_robots, effects)
         super().__init__(model.law, model.reception, num_axes=mission.num_axes)
         rows = np.empty(0)
         with open_file(path, "table of gains") as file:

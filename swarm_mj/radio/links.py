@@ -12,7 +12,14 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.radio.fading import NO_FADING, NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import FreeSpaceRadio
-from swarm_mj.radio.power_law import FREE_SPACE_EXPONENT, PowerLaw, free_space_law, powers_between
+from swarm_mj.radio.power_law import (
+    FREE_SPACE_EXPONENT,
+    PowerLaw,
+    breakpoint_between,
+    free_space_law,
+    places_of,
+    powers_between,
+)
 from swarm_mj.radio.reception import (
     CERTAIN,
     MIN_DISTANCE_M,
@@ -99,13 +106,14 @@ def links_between(
         received_mw *= is_known[:, None] & is_known[None, :]
     distance_over_std = np.full((num_robots, num_robots), np.inf)
     if spread_m is not None:
-        apart_m = position_m[:, None] - position_m[None, :]
+        antenna_m = places_of(law.antennas, position_m)
+        apart_m = antenna_m[:, None] - antenna_m[None, :]
         distance_m = np.maximum(np.sqrt(np.sum(apart_m**2, axis=2)), MIN_DISTANCE_M)
         variance_m2 = spread_m[:, None] ** 2 + spread_m[None, :] ** 2
         np.divide(distance_m, np.sqrt(variance_m2), out=distance_over_std, where=variance_m2 > 0.0)
         if law.breakpoint_m < np.inf:
             # The steeper the path loss, the more dB an error of the distance is worth.
-            is_steeper = distance_m > law.breakpoint_m
+            is_steeper = distance_m > _breakpoints_between(antenna_m, law)
             distance_over_std /= np.where(is_steeper, law.exponent / FREE_SPACE_EXPONENT, 1.0)
     return Links(
         received_mw=received_mw,
@@ -116,6 +124,19 @@ def links_between(
         row=np.zeros((num_robots, num_robots), dtype=np.int64),
         interference_mw=received_mw,
     )
+
+
+@compiled()
+def _breakpoints_between(
+    antenna_m: Float[np.ndarray, "N D"], law: PowerLaw
+) -> Float[np.ndarray, "N N"]:
+    """Return up to where free space holds between all pairs of antennas [m]."""
+    num_robots = antenna_m.shape[0]
+    breakpoint_m = np.empty((num_robots, num_robots))
+    for i in range(num_robots):
+        for j in range(num_robots):
+            breakpoint_m[i, j] = breakpoint_between(antenna_m, i, j, law)
+    return breakpoint_m
 
 
 def doubtful(links: Links, curves: Curves, std_db: Float[np.ndarray, "N N"]) -> Links:

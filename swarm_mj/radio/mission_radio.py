@@ -12,11 +12,11 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.state import Obstacles
+from swarm_mj.physics.state import Antennas, Obstacles
 from swarm_mj.radio.asynchronous import AsynchronousChannel
 from swarm_mj.radio.composed import ComposedChannel, Reception
 from swarm_mj.radio.effect import Effect
-from swarm_mj.radio.effects import HighPower, Obstruction, effects_of, model_of
+from swarm_mj.radio.effects import BodyAntennas, Obstruction, effects_of, model_of
 from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
@@ -127,7 +127,7 @@ def mission_radio(
     obstacles: Obstacles | None = None,
     own: Channel | VaryingChannel | None = None,
 ) -> MissionRadio:
-    """Return a mission's channel, belief and truth.
+    """Return a mission's channel, belief and truth; the models of its robots have their antennas.
 
     Args:
         mission: Whose numbers make them.
@@ -138,15 +138,20 @@ def mission_radio(
 
     Returns:
         The channel, which is to be started if it has a `start`, and the two models of it.
+
+    Raises:
+        ValueError: The model of a robot is refused.
     """
     radio = radio_of(mission)
-    belief = _belief(mission, radio, obstacles)
+    antennas = team_antennas(mission)
+    belief = _belief(mission, radio, obstacles, antennas)
     if own is not None:
         known = own if isinstance(own, ComposedChannel) else None  # a table of gains
         return MissionRadio(own, belief, TrueLinks(radio=radio, channel=known))
     effects: list[Effect] = [*effects_of(mission)]
     if obstacles is not None:
         effects.append(Obstruction(obstacles=obstacles))
+    effects = _with_antennas(effects, antennas)
     if not effects:
         return MissionRadio(radio, belief, TrueLinks(radio=radio))
     model = model_of(radio, mission.num_robots, effects)
@@ -164,14 +169,37 @@ def mission_radio(
     return MissionRadio(asynchronous, belief, truth)
 
 
-def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None) -> Belief:
-    """Return what the mission grants to know of its channel."""
+def team_antennas(mission: Mission) -> Antennas | None:
+    """Return the antennas that robots' models declare; None of points, or if none does."""
+    if not mission.has_bodies:
+        return None
+    from swarm_mj.physics.robots import antennas_of  # MuJoCo is slow to import
+
+    return antennas_of(mission)
+
+
+def _with_antennas(effects: list[Effect], antennas: Antennas | None) -> list[Effect]:
+    """Return a channel's effects and its antennas, unless these change nothing there."""
+    if antennas is None or (antennas.are_alike and not effects):
+        return effects
+    return [*effects, BodyAntennas(antennas=antennas)]
+
+
+def _belief(
+    mission: Mission,
+    radio: FreeSpaceRadio,
+    obstacles: Obstacles | None,
+    antennas: Antennas | None,
+) -> Belief:
+    """Return what the mission grants to know of its channel; antennas are of its statistics."""
     known: list[Effect] = []
     if mission.grants("statistics"):
         known.extend(effects_of(mission))
     if mission.grants("map") and obstacles is not None:
         centre_m = obstacles.centre_m + np.array([mission.map_offset_m, 0.0, 0.0])
         known.append(Obstruction(obstacles=obstacles._replace(centre_m=centre_m)))
+    if mission.grants("statistics"):
+        known = _with_antennas(known, antennas)
     belief = Belief(radio=radio, position_noise_m=mission.position_noise_m)
     if not known:
         return belief
@@ -179,13 +207,6 @@ def _belief(mission: Mission, radio: FreeSpaceRadio, obstacles: Obstacles | None
     return replace(
         belief, law=model.law, reception=model.reception, shadowing_db=model.shadowing_db
     )
-
-
-def by_robot(mission: Mission, default_mw: float) -> Float[np.ndarray, "N"]:
-    """Return a power of each robot's packets where a default radio has this one [mW]."""
-    power_mw = np.full(mission.num_robots, default_mw)
-    high_power = HighPower.of(mission)
-    return power_mw if high_power is None else high_power.added_to(power_mw)
 
 
 def _with_chances(links: Links, reception: Reception | None, std_db: float) -> Links:

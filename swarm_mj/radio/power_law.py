@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from swarm_mj.mission.geometry import PLANE, squared_distance
-from swarm_mj.physics.state import ROBOT_HEIGHT_M, Obstacles
+from swarm_mj.physics.state import ROBOT_HEIGHT_M, Antennas, Obstacles
 from swarm_mj.radio.fading import Waves, follow_robots, shadow
 from swarm_mj.radio.obstruction import obstruct
 from swarm_mj.radio.reception import received_power
@@ -21,15 +21,19 @@ from swarm_mj.system.compiled import compiled
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 FREE_SPACE_EXPONENT = 2.0
 TWO_RAY_EXPONENT = 4.0
+LEAST_HEIGHT_M = 0.1  # above the floor, which an antenna counts as at least
 
 
 class PowerLaw(NamedTuple):
     """The law of mean powers without shadowing; free space by default."""
 
-    at_1_m: Float[np.ndarray, "N"]  # power of each robot's packets after one metre, in any unit
+    # Power of each robot's packets after one metre, in any unit; its own antenna's gain included.
+    at_1_m: Float[np.ndarray, "N"]
     breakpoint_m: float = math.inf  # up to which free space holds
     exponent: float = FREE_SPACE_EXPONENT  # n, beyond it
     obstacles: Obstacles | None = None
+    antennas: Antennas | None = None  # None: where the robots are, and without gain
+    is_by_height: bool = False  # whether both antennas' heights [m] multiply the breakpoint
 
 
 class MeanPowers(NamedTuple):
@@ -64,7 +68,8 @@ def two_ray_breakpoint_m(height_m: float, frequency_hz: float) -> float:
     """Return the crossover distance of two-ray ground reflection (Rappaport 2002, Eq. 4.52).
 
     Free space holds up to 4 pi h^2 / lambda, for antennas at height h. From there on the reflection
-    from the ground nearly cancels the direct ray, and the loss is d^4 / h^4.
+    from the ground nearly cancels the direct ray, and the loss is d^4 / h^4. For two heights, their
+    product is in place of h^2.
     """
     return 4.0 * math.pi * height_m**2 / (SPEED_OF_LIGHT_MPS / frequency_hz)
 
@@ -87,11 +92,48 @@ def write_powers(
     i: int, position_m: Float[np.ndarray, "N D"], law: PowerLaw, power: Float[np.ndarray, "N"]
 ) -> None:
     """Fill `power`: the mean power of i's packets at every robot; nobody receives itself."""
-    for j in range(position_m.shape[0]):
-        apart_m2 = squared_distance(position_m, i, j)
-        power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)
+    antenna_m = places_of(law.antennas, position_m)
+    if law.is_by_height:
+        for j in range(antenna_m.shape[0]):
+            apart_m2 = squared_distance(antenna_m, i, j)
+            breakpoint_m = breakpoint_between(antenna_m, i, j, law)
+            power[j] = power_after(law.at_1_m[i], apart_m2, breakpoint_m, law.exponent)
+    else:  # by itself, so that it is compiled to vectors
+        for j in range(antenna_m.shape[0]):
+            apart_m2 = squared_distance(antenna_m, i, j)
+            power[j] = power_after(law.at_1_m[i], apart_m2, law.breakpoint_m, law.exponent)
     power[i] = 0.0
-    obstruct(i, position_m, ROBOT_HEIGHT_M, law.obstacles, power)
+    _receive(law.antennas, power)
+    obstruct(i, antenna_m, ROBOT_HEIGHT_M, law.obstacles, power)
+
+
+@compiled()
+def places_of(
+    antennas: Antennas | None, position_m: Float[np.ndarray, "N D"]
+) -> Float[np.ndarray, "N D"]:
+    """Return where antennas are, above their robots [m]."""
+    if antennas is None:  # then they are not even copied
+        return position_m
+    placed_m = position_m.copy()
+    placed_m[:, PLANE] += antennas.height_m
+    return placed_m
+
+
+@compiled()
+def breakpoint_between(antenna_m: Float[np.ndarray, "N D"], i: int, j: int, law: PowerLaw) -> float:
+    """Return up to where free space holds between two antennas [m]."""
+    if not law.is_by_height:
+        return law.breakpoint_m
+    first_m = max(antenna_m[i, PLANE], LEAST_HEIGHT_M)
+    other_m = max(antenna_m[j, PLANE], LEAST_HEIGHT_M)
+    return law.breakpoint_m * first_m * other_m
+
+
+@compiled()
+def _receive(antennas: Antennas | None, power: Float[np.ndarray, "N"]) -> None:
+    """Multiply the power at every robot by the gain of its antenna."""
+    if antennas is not None:
+        power *= antennas.gain
 
 
 @compiled()

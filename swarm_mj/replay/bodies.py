@@ -49,7 +49,7 @@ def draw_bodies(out: RerunLog, radius_m: float) -> None:
 def _geoms(kind: RobotKind) -> dict[str, rr.AsComponents]:
     """Return the shapes that are seen of a robot in its own frame, by the names of its geoms."""
     model = kind.model
-    data = rest_pose(kind)
+    data = rest_pose(kind.model)
     data.geom_xpos[:, 2] -= data.xpos[1, 2]  # of a base on a plane, which is above the floor
     found: dict[str, rr.AsComponents] = {}
     for g in _seen(model):

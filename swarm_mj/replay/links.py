@@ -11,7 +11,7 @@ from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
 
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.radio.composed import strong_groups
-from swarm_mj.radio.mission_radio import by_robot, radio_of
+from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.replay import palette
 from swarm_mj.replay.palette import Fate, LinkKind
 from swarm_mj.simulation.swarm import Swarm
@@ -194,8 +194,9 @@ def radio_snapshot(swarm: Swarm, index: int = 0) -> RadioSnapshot | None:
     links["sender"], links["receiver"] = np.nonzero(differs)
     links["is_too_weak"] = is_believed[differs]
     power_mw = np.maximum(true_mw[differs], np.finfo(float).tiny)
-    sent_mw = by_robot(mission, radio_of(mission).power_mw)[links["sender"]]
-    links["loss_db"] = np.round(to_db(sent_mw / power_mw))
+    radio = radio_of(mission)
+    loss_at_1_m = radio.power_mw / radio.received_at_1_m_mw
+    links["loss_db"] = np.round(to_db(channel.at_1_m_mw[differs] * loss_at_1_m / power_mw))
     # Rounded down: a packet that does not decode must not show a margin of 0 dB.
     links["margin_db"] = np.floor(to_db(power_mw / min_mw))
     return RadioSnapshot(

@@ -32,13 +32,14 @@ def summary(**numbers):
     return Summary(**(dict.fromkeys(names, NAN) | given | {"num_windows": 100}))
 
 
-def shown(policy_name, task, its, strayed=0, crashed=None):
+def shown(policy_name, task, its, strayed=0, crashed=None, energy_j=(None, None)):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=7)
     policy = make_policy(policy_name, mission)
     numbers = flight_numbers(mission, policy, its)
     ended = {"wall_seconds": 1.5, "interrupted": False, "heard_share": 0.254, "strayed": strayed}
     ended["crashed"] = crashed
+    ended["energy_mean_j"], ended["energy_worst_j"] = energy_j
     rows = flight_rows(mission, FlightSummary(**numbers, **ended))
     console = Console(width=80, highlight=False)
     with console.capture() as printed:
@@ -120,6 +121,15 @@ def test_only_bodies_crash():
     assert row not in shown("tdma", "random-walk", walk)[0]
     assert shown("tdma", "random-walk", walk, crashed=0)[0][row] == "none"
     assert shown("tdma", "random-walk", walk, crashed=3)[0][row] == "3; off from then on"
+
+
+def test_only_bodies_use_energy():
+    """Points, and models that do not say what they use, have no row of it."""
+    row = "energy per robot; most"
+    walk = summary(**BROADCAST)
+    assert row not in shown("tdma", "random-walk", walk)[0]
+    its = shown("tdma", "random-walk", walk, crashed=0, energy_j=(2821.4, 3104.6))[0]
+    assert its[row] == "2,821 J; 3,105 J"
 
 
 @pytest.mark.parametrize(("policy", "task", "numbers", "rows"), ROWS)

@@ -19,6 +19,7 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
+from swarm_mj.system.packages import asset
 
 SHORT = {"num_robots": 6, "num_windows": 20, "range_ratio": 0.5}
 OPTIONS = ("--robots", "6", "--windows", "20", "--range-ratio", "0.5")
@@ -100,6 +101,22 @@ def test_robots_out_of_everyone_s_range_at_the_end_are_counted():
     assert talking.summary.strayed == 0
     silent = swarm_mj.fly(mission, policy="aloha", probability=0.0, record=False)
     assert silent.summary.strayed == 4
+
+
+def test_a_flight_says_the_energy_of_bodies_alone(tmp_path):
+    """Hover with 56.4 W each, for 2 s; a model that declares no efficiency does not say."""
+    flown = {"num_robots": 3, "num_windows": 20, "policy": "tdma", "record": False}
+    hovering = swarm_mj.fly("stationary", robot="quadrotor", **flown).summary
+    assert hovering.energy_mean_j == pytest.approx(2.0 * 56.4, rel=1e-3)
+    assert hovering.energy_worst_j == pytest.approx(hovering.energy_mean_j)
+    silent = tmp_path / "silent.xml"
+    text = asset("rover.xml").read_text()
+    silent.write_text(text.replace('<numeric name="efficiency" data="1"/>', ""))
+    pilot = "swarm_mj.physics.pilots:RoverPilot"
+    driving = swarm_mj.fly("stationary", robot=str(silent), pilot=pilot, **flown).summary
+    points = swarm_mj.fly("stationary", **flown).summary
+    for its in (driving, points):
+        assert (its.energy_mean_j, its.energy_worst_j) == (None, None)
 
 
 @pytest.mark.slow

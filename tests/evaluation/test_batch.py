@@ -142,3 +142,17 @@ def test_no_policy_goes_below_the_floor(name, task, failing):
         floors.append(floor_of(swarm, known))
         assert np.all(flown.costs.age_windows >= floors[-1] - 1e-9)
     assert (np.max(floors) > 0.0) == (task != "stationary")
+
+
+def test_energy_is_that_of_the_robots_at_the_end():
+    """Six quadrotors and rovers; of points nothing is known."""
+    mission = small(robot="quadrotor:2,rover:4", num_windows=5)
+    swarm = Swarm(mission, SEEDS)
+    found = costs_of(swarm, rollout(swarm, make_policy("tdma", mission)))
+    by_robot_j = swarm.states.energy_j.tolist()
+    for b in range(len(SEEDS)):
+        assert found.energy_j[b] == pytest.approx(sum(by_robot_j[b]) / 6.0)
+        assert found.most_energy_j[b] == max(by_robot_j[b]) > 0.0
+    points = fly_batch(batch(small(num_windows=5)))
+    assert np.all(np.isnan(points.energy_j))
+    assert np.all(np.isnan(points.most_energy_j))

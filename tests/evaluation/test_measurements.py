@@ -34,6 +34,8 @@ def costs(aoi, **overrides):
         "decay_rate": NONE,
         "strayed": np.zeros(3),
         "crashed": np.full(3, np.nan),
+        "energy_j": np.full(3, np.nan),
+        "most_energy_j": np.full(3, np.nan),
         "packets_sent": np.zeros(3),
         "packets_transmitted": np.zeros(3),
         "packets_delivered": NONE,
@@ -155,6 +157,15 @@ def test_robots_that_do_not_flock_do_not_agree_either():
     assert found.agreed_share_interval == (None, None)
     assert math.isnan(found.decay_rate.mean)
     assert math.isnan(found.strayed.mean)
+
+
+def test_energy_is_the_mean_of_missions_and_the_most_of_any_robot():
+    own = costs([0.0] * 3, energy_j=[10.0, 20.0, 60.0], most_energy_j=[15.0, 90.0, 70.0])
+    found = measured(own, mission=paper("stationary", robot="quadrotor"))
+    assert (found.energy_j.mean, found.most_energy_j.worst) == (30.0, 90.0)
+    of_points = measured(costs([0.0] * 3))
+    assert math.isnan(of_points.energy_j.mean)
+    assert math.isnan(of_points.most_energy_j.worst)
 
 
 def test_the_policy_and_its_options_are_those_of_the_study():

@@ -40,6 +40,8 @@ def costs(aoi, **overrides):
         "decay_rate": [None] * n,
         "strayed": [0.0] * n,
         "crashed": [None] * n,
+        "energy_j": [None] * n,
+        "most_energy_j": [None] * n,
         "packets_sent": [1000] * n,
         "packets_transmitted": [1500] * n,
         "packets_delivered": [250] * n,

@@ -5,6 +5,7 @@ import pytest
 from swarm_mj import paper
 from swarm_mj.physics.pilots import Pilot, QuadrotorPilot, RoverPilot
 from swarm_mj.physics.robots import (
+    antennas_of,
     heading_of,
     kinds_of,
     make_pilots,
@@ -37,6 +38,15 @@ SENSORS = (
 def mjcf(body=BODY, actuator=LIFT, option='<option timestep="0.002"/>'):
     floor = '<geom type="plane" size="5 5 1"/>'
     return f"<mujoco>{option}<worldbody>{floor}{body}</worldbody>{actuator}</mujoco>"
+
+
+def with_antenna(place):
+    return BODY.replace('<site name="s"/>', f'<site name="s"/><site name="antenna" pos="{place}"/>')
+
+
+def declaring(name, number):
+    option = '<option timestep="0.002"/>'
+    return f'{option}<custom><numeric name="{name}" data="{number}"/></custom>'
 
 
 @pytest.fixture
@@ -129,6 +139,10 @@ def test_an_own_pilot_for_one_of_two_shipped_kinds_is_refused():
         (mjcf(body=BODY.replace('mass="0.2"', 'mass="nan"')), "nan in mass"),
         (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + FAR), "sensor of what is not in its"),
         (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + APART), "sensor of what is not in"),
+        (mjcf(body=with_antenna("0.1 0 0.3")), r"right above or below its base.*\(0.1, 0, 0.3\) m"),
+        (mjcf(body=with_antenna("0 0 11")), "at most 10 m away"),
+        (mjcf(option=declaring("antena_gain", 2)), "did you mean antenna_gain_dbi"),
+        (mjcf(option=declaring("efficiency", 2)), "efficiency must be a number from 0.01 to 1"),
     ],
 )
 def test_a_file_that_is_no_robot_is_refused_in_a_line(own, text, said):
@@ -228,3 +242,35 @@ def test_limits_are_those_of_all_kinds(own, tmp_path):
     bumper = '<sensor><touch site="s" cutoff="5"/><touch site="s" cutoff="1"/></sensor>'
     mission = paper(robot=f"{own(mjcf(actuator=LIFT + bumper))}:1,{near}:1", num_robots=2)
     assert sensor_limits(kinds_of(mission)).tolist() == [5.0, 1.0]
+
+
+def test_antennas_are_as_their_models_declare_robot_by_robot(own):
+    """The quadrotor has none; the file's is 0.3 m up, gains 10 dBi, and sends with a tenth."""
+    option = '<option timestep="0.002"/><custom><numeric name="antenna_gain_dbi" data="10"/>'
+    option += '<numeric name="power_class_db" data="-10"/></custom>'
+    name = own(mjcf(body=with_antenna("0 0 0.3"), option=option))
+    antennas = antennas_of(paper(robot=f"quadrotor:2,{name}:1", num_robots=3))
+    np.testing.assert_allclose(antennas.height_m, [0.0, 0.0, 0.3])
+    np.testing.assert_allclose(antennas.gain, [1.0, 1.0, 10.0])
+    np.testing.assert_allclose(antennas.power, [1.0, 1.0, 0.1])
+    assert not antennas.are_alike
+
+
+def test_an_antenna_within_another_body_counts_from_the_base(own):
+    mast = '<body pos="0 0 0.5"><geom size="0.1" mass="0.1"/><site name="antenna" pos="0 0 1"/>'
+    body = BODY.replace('<site name="s"/>', f'<site name="s"/>{mast}</body>')
+    [kind] = kinds_of(paper(robot=own(mjcf(body=body)), num_robots=2))
+    assert kind.antenna_m == pytest.approx(1.5)
+
+
+def test_the_rovers_antenna_is_on_its_deck():
+    """Its data sheet's height, over the floor; all alike, so nothing changes in free space."""
+    mission = paper(robot="rover", num_robots=2)
+    [kind] = kinds_of(mission)
+    assert kind.base_m + kind.antenna_m == pytest.approx(0.250)
+    assert antennas_of(mission).are_alike
+
+
+def test_points_and_quadrotors_declare_no_antennas():
+    assert antennas_of(paper(num_robots=2)) is None
+    assert antennas_of(paper(robot="quadrotor", num_robots=2)) is None

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from antennas import write_rover
 from hypothesis import given
 from hypothesis import strategies as st
 from walls import walls
@@ -143,6 +144,16 @@ def test_robots_behind_a_wall_are_not_sensed():
     assert transmits(started(MISSION), [0, 1], at(-200.0, 200.0)).tolist() == [True, False]
     behind = started(paper("stationary", num_robots=2), obstacles=walls(0.01, 0))
     assert transmits(behind, [0, 1], at(-200.0, 200.0)).tolist() == [True, True]
+
+
+def test_antennas_with_gain_are_sensed_farther_off(tmp_path):
+    """Twice 6 dB less 3 dB of power are 9 dB: 2.8 times as far as without, 2.5 ranges."""
+    sensing = started(paper("stationary", num_robots=2, robot=write_rover(tmp_path)))
+    for factor, second in ((0.98, False), (1.02, True)):
+        position_m = np.full((1, 2, 3), 0.1)
+        position_m[0, :, 0] = [0.0, factor * 2.5 * 10 ** (9.0 / 20.0) * MISSION.range_m]
+        states = RobotStates(position_m=position_m, velocity_mps=np.zeros_like(position_m))
+        assert transmits(sensing, [0, 1], states).tolist() == [True, second]
 
 
 def test_a_robot_that_failed_neither_transmits_nor_is_sensed():

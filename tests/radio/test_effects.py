@@ -19,6 +19,7 @@ from swarm_mj.radio.carrier_sensing import CarrierSensing, usual_busy_dbm
 from swarm_mj.radio.effect import Effect, MissionEffect
 from swarm_mj.radio.effects import (
     EFFECTS,
+    BodyAntennas,
     Obstruction,
     beyond_free_space,
     effects_of,
@@ -162,7 +163,17 @@ def test_obstacles_are_an_effect_of_the_scene():
     model = Obstruction(obstacles=WALL).change(model_of(radio_of(paper()), 40, effects=[]))
     assert model.law.obstacles is WALL
     assert not isinstance(mission_radio(paper(), WALL).channel, FreeSpaceRadio)
-    assert {*Effect.__subclasses__()} == {MissionEffect, Obstruction}
+    assert {*Effect.__subclasses__()} == {MissionEffect, Obstruction, BodyAntennas}
+
+
+def test_bodies_have_antennas_of_their_own_heights_for_two_ray():
+    """4 pi h h / lambda, for antennas 1 m up; a title names no height of the mission's."""
+    mission = paper(num_robots=4, robot="quadrotor", path_loss="two-ray", antenna_height_m=3.0)
+    law = model_of(radio_of(mission), 4, effects_of(mission)).law
+    wavelength_m = 299_792_458.0 / mission.frequency_hz
+    assert law.breakpoint_m == pytest.approx(4.0 * math.pi / wavelength_m)
+    assert law.is_by_height
+    assert beyond_free_space(mission) == "path_loss two-ray"
 
 
 def test_numbers_of_effects_are_the_missions():

@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from antennas import links_db, write_rover
 
 from swarm_mj.mission import paper
 from swarm_mj.radio.gain_table import HEADER, GainTable
@@ -127,3 +128,22 @@ def test_what_is_no_table_of_gains_is_refused(tmp_path, text, said):
         Components(channel=f"table:{path}").made(MISSION)
     with pytest.raises(ValueError, match=r"none.csv cannot be found"):
         Components(channel=f"table:{tmp_path / 'none.csv'}").made(MISSION)
+
+
+def test_antennas_of_robots_add_to_the_gains_of_a_table(tmp_path):
+    """10 dB less than free space everywhere, between two quadrotors and two rovers."""
+    robot = f"quadrotor:2,{write_rover(tmp_path)}:2"
+    mission = paper("stationary", num_robots=4, robot=robot)
+    known = drawn_places(100, seed=11)
+    rows = np.column_stack([known, friis_db(known) - 10.0])
+    path = tmp_path / "gains.csv"
+    np.savetxt(path, rows, delimiter=",", header=HEADER, comments="")
+    channel = GainTable(mission, path)
+    channel.start(4, [np.random.default_rng(0)])
+    heights_m = np.array([20.0, 20.0, 0.1, 0.1])
+    position_m = np.column_stack([drawn_places(4, seed=12)[:, :2], heights_m])
+    received_mw = channel.mean_powers_mw(position_m, 0)
+    for (i, j), (budget_db, apart_m) in links_db(position_m, (False, False, True, True)).items():
+        free_mw = radio_of(mission).received_at_1_m_mw / apart_m**2
+        expected_db = 10.0 * math.log10(free_mw) + budget_db - 10.0
+        assert 10.0 * math.log10(received_mw[i, j]) == pytest.approx(expected_db, abs=0.01)

@@ -5,6 +5,7 @@ from typing import get_args
 
 import numpy as np
 import pytest
+from antennas import links_db, write_rover
 from scipy.stats import norm
 from walls import walls
 
@@ -260,3 +261,62 @@ def test_everyone_knows_how_far_positions_err(known):
     assert over_std[0, 1] == pytest.approx(100.0 / math.hypot(3.0, 3.0))
     over_std = belief.links(position_m, np.array([4.0, 0.0])).distance_over_std
     assert over_std[0, 1] == pytest.approx(100.0 / math.hypot(5.0, 3.0))
+
+
+IN_SPACE_M = np.array([[0.0, 0.0, 20.0], [60.0, 0.0, 25.0], [0.0, 80.0, 0.1], [30.0, 90.0, 0.1]])
+IS_ROVER = (False, False, True, True)
+
+
+def mixed_team(tmp_path, **fields):
+    """Two quadrotors without antennas of their own, and two rovers with them."""
+    robot = f"quadrotor:2,{write_rover(tmp_path)}:2"
+    return paper(num_robots=4, robot=robot, **fields)
+
+
+@pytest.mark.parametrize("knows", ["nothing", "statistics"])
+def test_antennas_by_robot_type_against_a_loop(tmp_path, knows):
+    """Free space between antennas, in dB; only who knows the statistics believes in them."""
+    mission = mixed_team(tmp_path, prior_knowledge=knows)
+    made = mission_radio(mission)
+    made.channel.start(4, [np.random.default_rng(1)])
+    true_mw = made.truth.links(IN_SPACE_M, 0).received_mw
+    believed_mw = made.belief.links(IN_SPACE_M).received_mw
+    at_1_m_dbm = 10.0 * math.log10(radio_of(mission).received_at_1_m_mw)
+    for (i, j), (budget_db, apart_m) in links_db(IN_SPACE_M, IS_ROVER).items():
+        expected_mw = 10 ** ((at_1_m_dbm + budget_db - 20.0 * math.log10(apart_m)) / 10.0)
+        assert true_mw[i, j] == pytest.approx(expected_mw)
+        if knows == "nothing":
+            apart_m = np.linalg.norm(IN_SPACE_M[i] - IN_SPACE_M[j])
+            expected_mw = radio_of(mission).received_at_1_m_mw / apart_m**2
+        assert believed_mw[i, j] == pytest.approx(expected_mw)
+
+
+def test_the_channel_decodes_by_the_antennas(tmp_path):
+    """At 400 m twice 6 dB, less 3 dB, are more than the 4.1 dB beyond the range of 250 m."""
+    mission = mixed_team(tmp_path)
+    channel = mission_radio(mission).channel
+    channel.start(4, [np.random.default_rng(1)])
+    position_m = np.zeros((1, 4, 3))
+    position_m[0, :, 0] = [0.0, 400.0, 5000.0, 5400.0]
+    slot, everyone = np.zeros(1, dtype=int), -1
+    heard = channel.at(slot, slot)(position_m, np.array([[everyone, 1, everyone, 3]]))
+    assert heard.tolist() == [[0, 1, 2, 2]]
+
+
+@pytest.mark.parametrize("robot", ["point", "quadrotor", "rover"])
+def test_without_declarations_or_with_antennas_that_are_alike_the_radio_is_the_papers(robot):
+    mission = paper(num_robots=4, robot=robot)
+    assert mission_radio(mission).channel == radio_of(mission)
+
+
+def test_antennas_that_are_alike_count_where_heights_do():
+    """The rover's stands 0.25 m above the floor: two-ray from 4 pi 0.25² / lambda on."""
+    mission = paper(num_robots=2, robot="rover", path_loss="two-ray")
+    truth = mission_radio(mission).truth
+    truth.channel.start(2, [np.random.default_rng(1)])
+    position_m = np.array([[0.0, 0.0, 0.125], [50.0, 0.0, 0.125]])
+    wavelength_m = 299_792_458.0 / mission.frequency_hz
+    breakpoint_m = 4.0 * math.pi * 0.25**2 / wavelength_m
+    free_mw = radio_of(mission).received_at_1_m_mw / 50.0**2
+    expected_mw = free_mw * (breakpoint_m / 50.0) ** 2
+    assert truth.mean_powers_mw(position_m, 0)[0, 1] == pytest.approx(expected_mw)

@@ -5,6 +5,7 @@ from dataclasses import replace
 import networkx
 import numpy as np
 import pytest
+from antennas import links_db, write_rover
 from mujoco import mjtGeom
 
 from swarm_mj.mission import paper
@@ -216,3 +217,31 @@ def test_the_more_is_missing_the_darker():
     brightness = shades("too_weak", found).astype(int).sum(axis=1)
     assert np.all(np.diff(brightness[:3]) < 0)
     assert brightness[2] == brightness[3]
+
+
+def test_losses_between_antennas_leave_out_their_gains(tmp_path):
+    """88.0 dB over 250 m; margins have the gains and powers of both robots of a link."""
+    robot = f"quadrotor:6,{write_rover(tmp_path)}:14"
+    mission = paper("stationary", num_robots=20, robot=robot)
+    swarm = Swarm(mission, [1], pilot="swarm_mj.physics.pilots:RoverPilot")
+    where_m = swarm.states.position_m[0]
+    loss_db, margin_db = {}, {}
+    for pair, (budget_db, apart_m) in links_db(where_m, [False] * 6 + [True] * 14).items():
+        loss_db[pair] = 88.013 + 20.0 * np.log10(apart_m / 250.0)
+        margin_db[pair] = 88.013 + budget_db - loss_db[pair]
+    found = radio_snapshot(swarm).links
+    assert not np.any(found["is_too_weak"])  # gains only add links
+    expected = {pair for pair, db in margin_db.items() if 0.0 <= db < 9.0}
+    seen = set()
+    for _, i, j, loss, margin, _ in found.tolist():
+        assert loss == pytest.approx(loss_db[i, j], abs=0.51)
+        assert margin == int(np.floor(margin_db[i, j]))
+        seen |= {(i, j), (j, i)}
+    far = {pair for pair in expected if apart_m_of(where_m, pair) > 250.0}
+    assert far
+    assert far <= seen
+
+
+def apart_m_of(where_m, pair):
+    first, second = pair
+    return np.linalg.norm(where_m[first] - where_m[second])
