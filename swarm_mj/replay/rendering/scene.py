@@ -10,7 +10,7 @@ from weakref import ref
 import mujoco._functions as functions  # private: type checkers see it only there
 import numpy as np
 from jaxtyping import Float, UInt8
-from mujoco._enums import mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
+from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._errors import FatalError
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
 from mujoco._specs import MjSpec
@@ -135,6 +135,15 @@ def _close(renderer: "ref[SceneRenderer]") -> None:
         left.close()
 
 
+def _base_of(robot: int, kinds: Sequence[RobotKind]) -> int:
+    """Return MuJoCo's number of a robot's base; points, which have no kinds, are one body each."""
+    sizes = [1] * robot
+    for kind in kinds:
+        each = kind.model.nbody - 1  # without the world
+        sizes[kind.first : kind.first + kind.num_robots] = [each] * kind.num_robots
+    return 1 + sum(sizes[:robot])
+
+
 def _pose(footage: Footage, row: int, kinds: Sequence[RobotKind]) -> Float[np.ndarray, "Q"]:
     """Return MuJoCo's coordinates of a window's robots."""
     if footage.height_m is None or footage.attitude is None:
@@ -226,8 +235,12 @@ def _shares(colour: Colour) -> list[float]:
 class SceneViewer:
     """MuJoCo's passive viewer, with robots and packets; to close the window ends the view alone."""
 
-    def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
-        """Open the window; raise OSError without a display, or if it is closed already."""
+    def __init__(self, mission: Mission, *, scene: Scene | None = None, camera: str = MAP) -> None:
+        """Open the window; raise OSError without a display, or if it is closed already.
+
+        It is first seen by a camera of `CAMERAS`. One that chases stays with its robot, while the
+        user turns it and comes nearer.
+        """
         import glfw  # both look for a display when they are imported
         from mujoco import viewer
 
@@ -235,7 +248,8 @@ class SceneViewer:
             warnings.simplefilter("ignore")
             if not glfw.init():  # MuJoCo's viewer would wait forever
                 raise OSError(NO_WINDOW)
-        self._model = pictured(mission, scene, *WINDOW)
+        self._chases = camera == CHASE
+        self._model = pictured(mission, scene, *WINDOW, is_near=self._chases)
         self._kinds = kinds_of(mission) if mission.has_bodies else []
         self._data = MjData(self._model)
         others = set(threading.enumerate())
@@ -252,21 +266,44 @@ class SceneViewer:
         self._markers = markers
         self._is_aimed = False
 
-    def show(self, footage: Footage) -> None:
-        """Show the footage's first window from now on."""
-        if not self._window.is_running():
+    @property
+    def is_open(self) -> bool:
+        """True until the window is closed."""
+        return self._window.is_running()
+
+    def show(self, footage: Footage, moment: float = 0) -> None:
+        """Show a moment of the footage from now on, in windows from 0."""
+        if not self.is_open:
             return
-        camera = markers.look_at(footage.ground, 0, *WINDOW)
+        row = round(moment)
+        footage = footage.moved_to(moment)
         with self._window.lock():
-            if not self._is_aimed:  # from then on it is the user's
-                camera.aim(self._window.cam)
-                self._window.opt.geomgroup[BEACONS] = 0
-                self._is_aimed = True
-            self._data.qpos[:] = _pose(footage, 0, self._kinds)
+            camera = self._camera(footage, row)
+            self._data.qpos[:] = _pose(footage, row, self._kinds)
             functions.mj_forward(self._model, self._data)
             self._markers.ngeom = 0
-            markers.draw_markers(self._markers, footage, 0, camera)
+            markers.draw_markers(self._markers, footage, row, camera)
         self._window.sync()
+
+    def _camera(self, footage: Footage, row: int) -> markers.Camera:
+        """Return the camera by which markers are drawn; the first time, aim the window's so."""
+        free = self._window.cam
+        if not self._chases:
+            camera = markers.look_at(footage.ground, row, *WINDOW)
+        else:
+            camera = markers.chase(footage, row, *WINDOW)
+        if not self._is_aimed:  # from then on it is the user's
+            camera.aim(free)
+            if self._chases:
+                free.type = mjtCamera.mjCAMERA_TRACKING.value
+                free.trackbodyid = _base_of(footage.ego, self._kinds)
+            self._window.opt.geomgroup[BEACONS] = 0
+            self._is_aimed = True
+        if self._chases:
+            camera = camera._replace(
+                distance_m=free.distance, azimuth_deg=free.azimuth, elevation_deg=-free.elevation
+            )
+        return camera
 
     def close(self) -> None:
         """Close the window and wait for its threads: a process that ends earlier may crash."""
