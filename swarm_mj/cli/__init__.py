@@ -34,7 +34,7 @@ COMMANDS: dict[str, str] = {
     "figures": "Draw the paper's figures from results.",
     "replay": "Open a replay in rerun's viewer, or make a video or a picture of it.",
     "export": "Write a replay as files of other tools: Foxglove, ns-3, tables.",
-    "scene": "Write the scene of a mission as one MJCF file.",
+    "scene": "Write a mission's scene as MJCF, or fly it in MuJoCo's viewer.",
     "doctor": "Say what works on this machine, and how to mend what does not.",
     "bench": "Time the simulation and its parts.",
 }

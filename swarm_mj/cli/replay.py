@@ -65,6 +65,11 @@ class ReplayOptions:
         None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
     )
     theme: str = _video("dark", "colours of the frame and the ground", choices=tuple(THEMES))
+    camera: str = _video(
+        view.MAP,
+        "where it is seen from: above, or by one that flies behind the observer",
+        choices=view.CAMERAS,
+    )
     scene: str | None = _video(
         None,
         "the scene of your own that the mission was flown in; of a picture, too",
@@ -104,8 +109,11 @@ def _check_together(options: ReplayOptions) -> None:
     if len(named) > 1:
         raise ValueError(f"{named[0]} is not allowed with {named[1]}; leave one out")
     is_styled = options.size or options.seconds or options.fps or options.theme != "dark"
+    is_styled = is_styled or options.camera != view.MAP
     if not options.video and is_styled:
-        raise ValueError("--size, --seconds, --fps and --theme are of videos; name one by --video")
+        raise ValueError(
+            "--size, --seconds, --fps, --theme and --camera are of videos; name one by --video"
+        )
     if not options.picture and options.window:
         raise ValueError("--window is of pictures; name one by --picture")
     if not (options.video or options.picture) and (options.force or options.scene):
@@ -178,7 +186,8 @@ def _style(options: ReplayOptions, suffix: str) -> view.VideoStyle:
         style = replace(style, width=width, height=height)
     seconds = options.seconds or style.seconds
     fps = options.fps or style.fps
-    return view.fitted(replace(style, seconds=seconds, fps=fps, theme=options.theme), suffix)
+    style = replace(style, seconds=seconds, fps=fps, theme=options.theme, camera=options.camera)
+    return view.fitted(style, suffix)
 
 
 def _in_scene(footage: "Footage", scene: str | None) -> "Footage":

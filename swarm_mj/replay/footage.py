@@ -1,6 +1,7 @@
 """The footage of a mission, window by window: what videos show, recorded or read from a replay."""
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -8,6 +9,7 @@ from jaxtyping import Bool, Float, Int, Int16, UInt8
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.scene import Scene
+from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.replay import links as compared
 from swarm_mj.replay import palette
 from swarm_mj.replay.links import Lines, LinkMismatch, LinkRows, PacketPaths, Positions
@@ -142,6 +144,44 @@ class Footage:
     def colours(self) -> UInt8[np.ndarray, "T N 3"]:
         """The robots' colours."""
         return palette.robot_colours(self.known_age, self.facts.full_scale, self.is_on, self.ego)
+
+    def place_m(self, row: int) -> Float[np.ndarray, "N 3"]:
+        """Return where the robots' middles are in space in one window [m]."""
+        if self.height_m is None:
+            return compared.lifted(self.position_m[row], ROBOT_HEIGHT_M)
+        return compared.lifted(self.position_m[row], self.height_m[row])
+
+    def moved_to(self, moment: float) -> "Footage":
+        """Return the same with the robots of the nearest window moved to a moment between two.
+
+        Moments count windows from 0; packets stay those of the window.
+        """
+        row = round(moment)
+        before = math.floor(moment)
+        share = moment - before
+        if share == 0.0:
+            return self
+        after = before + 1
+
+        def moved(values: Float[np.ndarray, "T N *D"]) -> Float[np.ndarray, "T N *D"]:
+            whole = values.copy()
+            whole[row] = values[before] + share * (values[after] - values[before])
+            return whole
+
+        height_m = attitude = None
+        if self.height_m is not None:
+            height_m = moved(self.height_m)
+        if self.attitude is not None:
+            # Both of a quaternion's signs are the same attitude: the nearer one is the shorter way.
+            dots = np.sum(self.attitude[before] * self.attitude[after], axis=1, keepdims=True)
+            near = self.attitude.copy()
+            near[after] *= np.where(dots < 0.0, -1.0, 1.0)
+            attitude = near
+            attitude[row] = near[before] + share * (near[after] - near[before])
+            attitude[row] /= np.linalg.norm(attitude[row], axis=1, keepdims=True)
+        return replace(
+            self, position_m=moved(self.position_m), height_m=height_m, attitude=attitude
+        )
 
     def packets_at(self, row: int) -> dict[Fate, PacketPaths]:
         """Return one window's packets by their fate; what matters more is drawn over the rest."""

@@ -126,16 +126,19 @@ def flattened(at_m: Float[np.ndarray, "*S 3"]) -> Float[np.ndarray, "*S 2"]:
     return np.delete(at_m, 2, axis=-1)
 
 
-def arcs(packets: PacketPaths, base_m: float, share: float = 1.0) -> Float[np.ndarray, "L P 3"]:
+def arcs(
+    packets: PacketPaths, base_m: float, share: float = 1.0, rise: float = RISE
+) -> Float[np.ndarray, "L P 3"]:
     """Return points along parabolas that start and end at `base_m` above the robots' places [m].
 
-    They cover this share of the way to the receiver: lost packets stop short of it.
+    They cover this share of the way to the receiver: lost packets stop short of it. The top is as
+    high as `rise` times the way.
     """
     along = np.linspace(0.0, 1.0, SEGMENTS + 1)
     way_m = share * (packets.end_m - packets.start_m)
     span_m = np.linalg.norm(way_m, axis=1)
     # The longer the higher: packets that cross on the ground stay apart in the picture.
-    height_m = base_m + 4.0 * RISE * span_m[:, None] * along * (1.0 - along)
+    height_m = base_m + 4.0 * rise * span_m[:, None] * along * (1.0 - along)
     points_m = packets.start_m[:, None] + along[:, None] * way_m[:, None]
     if points_m.shape[2] > PLANE:  # of bodies, which have heights of their own
         height_m = height_m + points_m[..., PLANE]

@@ -30,6 +30,7 @@ from swarm_mj.replay.links import (
     LinkRows,
     PacketPaths,
     flattened,
+    lifted,
 )
 from swarm_mj.replay.palette import Fate, LinkKind
 from swarm_mj.replay.rerun_log import TIMELINE
@@ -140,7 +141,7 @@ def _footage(facts: Facts, columns: Columns) -> Footage:
         is_cut_off=is_cut_off,
         mismatch=_mismatch(columns),
         is_on=is_on,
-        packets=_packets(columns, has_bodies=facts.mission.has_bodies),
+        packets=_packets(columns, position_m, height_m),
         age_mean=_numbers(columns[layers.MEAN_AGE.path, "Measurements:values"]),
         ground=shown_ground(position_m, facts.mission),
         height_m=height_m,
@@ -179,24 +180,42 @@ def _bodies(
     return np.stack(height_m, axis=1), np.stack(attitude, axis=1)
 
 
-def _packets(columns: Columns, *, has_bodies: bool) -> dict[Fate, PacketPaths]:
+def _packets(
+    columns: Columns,
+    position_m: Float[np.ndarray, "T N 2"],
+    height_m: Float[np.ndarray, "T N"] | None,
+) -> dict[Fate, PacketPaths]:
     found: dict[Fate, PacketPaths] = {}
     for fate, style in palette.PACKETS.items():
         strips = columns.get((layers.PACKET_ARCS[fate].path, "LineStrips3D:strips"))
         if strips is None:  # addressed packets have other fates than broadcasts
             continue
-        points_m = _numbers(strips).reshape(-1, SEGMENTS + 1, 3)
-        if not has_bodies:
-            points_m = flattened(points_m)
+        points_m = flattened(_numbers(strips).reshape(-1, SEGMENTS + 1, 3))
+        row = _rows(strips)
         start_m = points_m[:, 0]  # the first point of each arc, and the last:
         # From the way that is drawn to the whole one.
-        way_m = (points_m[:, -1] - start_m) / style.share
-        found[fate] = PacketPaths(
-            row=_rows(strips),
-            start_m=start_m,
-            end_m=start_m + way_m,
-        )
+        end_m = start_m + (points_m[:, -1] - start_m) / style.share
+        if height_m is not None:
+            start_m = _raised(start_m, row, position_m, height_m)
+            end_m = _raised(end_m, row, position_m, height_m)
+        found[fate] = PacketPaths(row=row, start_m=start_m, end_m=end_m)
     return found
+
+
+def _raised(
+    at_m: Float[np.ndarray, "L 2"],
+    row: Int[np.ndarray, "L"],
+    position_m: Float[np.ndarray, "T N 2"],
+    height_m: Float[np.ndarray, "T N"],
+) -> Float[np.ndarray, "L 3"]:
+    """Return places on the map at the heights of the robots there; `row` is each one's window."""
+    # What is drawn begins a little above the robots.
+    up_m = np.zeros(len(at_m))
+    for k in np.unique(row).tolist():
+        first, after = np.searchsorted(row, [k, k + 1])
+        apart_m = np.linalg.norm(at_m[first:after, None] - position_m[k], axis=2)
+        up_m[first:after] = height_m[k, np.argmin(apart_m, axis=1)]
+    return lifted(at_m, up_m)
 
 
 def _mismatch(columns: Columns) -> LinkMismatch:

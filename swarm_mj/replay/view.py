@@ -143,6 +143,12 @@ def free_ports(number: int) -> list[int]:
         return [server.getsockname()[1] for server in servers]
 
 
+# Where a video is seen from.
+MAP = "map"
+CHASE = "chase"
+CAMERAS = (MAP, CHASE)
+
+
 @dataclass(frozen=True, kw_only=True)
 class VideoStyle:
     """How a video is made."""
@@ -152,6 +158,7 @@ class VideoStyle:
     seconds: float = LONGEST_S  # in which the whole mission is shown
     fps: int | float = 25  # pictures per second
     theme: str = "dark"  # a name of `rendering.theme.THEMES`
+    camera: str = MAP  # of `CAMERAS`
 
     @property
     def num_frames(self) -> int:

@@ -67,6 +67,14 @@ def test_two_missions_make_one_gif(flown, here):
     assert shape(here / "a.gif") == (10, 160, 160)
 
 
+def test_a_video_by_the_chasing_camera_is_another_one(tdma, here):
+    for camera in ("map", "chase"):
+        arguments = ["replay", tdma, "--video", f"{camera}.mp4", "--camera", camera, *SMALL]
+        assert main(arguments) == 0
+        assert shape(here / f"{camera}.mp4") == (6, 160, 160)
+    assert Path("map.mp4").read_bytes() != Path("chase.mp4").read_bytes()
+
+
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
@@ -76,6 +84,8 @@ def test_two_missions_make_one_gif(flown, here):
         ("--video a.mp4 --web", "--web is not allowed with --video"),
         ("--seconds 5", "are of videos; name one by --video"),
         ("--theme light", "are of videos; name one by --video"),
+        ("--camera chase", "are of videos; name one by --video"),
+        ("--video a.mp4 --camera side", "camera must be one of map, chase, not"),
         ("--video a.mp4 --theme blue", "theme must be one of dark, light, not"),
         ("--picture a.png --video a.mp4", "--video is not allowed with --picture"),
         ("--picture a.jpg", "picture must be named *.png or *.svg or *.pdf, not a.jpg"),

@@ -35,6 +35,8 @@ FLIGHTS = {
     "failing": ("mst", 0.3, {"failure_fraction": 0.25}),  # 3 of 12 robots, after 15 windows
     # Robots that run between city blocks, under shadowing: some get cut off from the others.
     "blocked": ("random-flooding", 0.2, {"arena": "blocks", "shadowing_db": 6.0, **WALK}),
+    # Bodies at several heights, which tilt as they fly.
+    "high": ("mst", 0.3, {"robot": "quadrotor:10,rover:2", "height_range_m": 60.0}),
     "long": ("mst", 0.3, {"num_robots": 40, "num_windows": 500, "boundary": "none"}),
 }
 
@@ -65,8 +67,9 @@ def written(name, flight, **config):
     return replay
 
 
-two_way, flooded, still, failing, blocked, long = map(flown, FLIGHTS)
+two_way, flooded, still, failing, blocked, high, long = map(flown, FLIGHTS)
 replay = written("replay", "two_way", policy="mst", ratio=0.25)
 flood_replay = written("flood_replay", "flooded")
 blocked_replay = written("blocked_replay", "blocked")
 still_replay = written("still_replay", "still")
+high_replay = written("high_replay", "high")

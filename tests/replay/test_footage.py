@@ -116,3 +116,40 @@ def test_an_open_map_moves_no_more_than_keeps_the_team_in_view(low_m, high_m, ce
     assert shown.reach_m == pytest.approx(farthest_m)
     walled = followed(position_m, replace(mission, boundary="reflect"))
     assert not walled.moves
+
+
+def test_between_two_windows_robots_are_between_their_places(two_way):
+    """A quarter of the way from window 7 to window 8; of all other windows nothing changes."""
+    log = two_way.log
+    moved = log.moved_to(7.25)
+    between_m = 0.75 * log.position_m[7] + 0.25 * log.position_m[8]
+    np.testing.assert_allclose(moved.position_m[7], between_m)
+    np.testing.assert_array_equal(
+        np.delete(moved.position_m, 7, 0), np.delete(log.position_m, 7, 0)
+    )
+    assert log.moved_to(7.0) is log
+    later = log.moved_to(7.75)  # nearer to window 8, whose packets it has
+    np.testing.assert_allclose(
+        later.position_m[8], 0.25 * log.position_m[7] + 0.75 * log.position_m[8]
+    )
+
+
+def test_bodies_turn_on_the_shorter_way_and_climb_between_windows(high):
+    """From no turn to one of 0.2 rad about the vertical, whose quaternion has the other sign."""
+    log = high.log
+    height_m, attitude = log.height_m.copy(), log.attitude.copy()
+    height_m[7], height_m[8] = 10.0, 11.0
+    attitude[7] = (1.0, 0.0, 0.0, 0.0)
+    attitude[8] = (-np.cos(0.1), 0.0, 0.0, -np.sin(0.1))
+    moved = replace(log, height_m=height_m, attitude=attitude).moved_to(7.5)
+    middle = (8, slice(None))
+    np.testing.assert_allclose(moved.height_m[middle], 10.5)
+    half = np.tile([np.cos(0.05), 0.0, 0.0, np.sin(0.05)], (12, 1))
+    np.testing.assert_allclose(moved.attitude[middle], half, atol=1e-12)
+
+
+def test_points_have_their_middle_1_m_above_the_floor_and_bodies_at_their_height(two_way, high):
+    place_m = two_way.log.place_m(3)
+    np.testing.assert_array_equal(place_m[:, :2], two_way.log.position_m[3])
+    assert np.all(place_m[:, 2] == 1.0)
+    np.testing.assert_array_equal(high.log.place_m(3)[:, 2], high.log.height_m[3])

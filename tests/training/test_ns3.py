@@ -17,6 +17,7 @@ import pytest
 from reference import ns3
 from scipy.stats import ks_2samp
 
+import swarm_mj
 from swarm_mj.mission import paper
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.fading import fade, mixed
@@ -52,9 +53,14 @@ def started(mission, num_missions=1):
     return radio
 
 
-def ours(name, threshold_factor=1.0):
-    """The sender that each robot decodes [k, j] in our channel, whose threshold may be wrong."""
-    position_m, recipient = load(name)["position_m"], load(name)["recipient"]
+def ours(name, threshold_factor=1.0, position_m=None):
+    """The sender that each robot decodes [k, j] in our channel, whose threshold may be wrong.
+
+    None for the positions is where ns-3 had the robots.
+    """
+    recipient = load(name)["recipient"]
+    if position_m is None:
+        position_m = load(name)["position_m"]
     each = np.arange(len(recipient))  # a mission for each scene, in its first slot
     channel = started(ns3.SETS[name].mission, len(each)).channel
     if isinstance(channel, ComposedChannel):
@@ -63,6 +69,12 @@ def ours(name, threshold_factor=1.0):
         return channel.at(np.zeros_like(each), each)(position_m, recipient)
     assert isinstance(channel, FreeSpaceRadio)
     return replace(channel, threshold=channel.threshold * threshold_factor)(position_m, recipient)
+
+
+def apart_at_one_height(name):
+    """The receptions [k, j] that we decide otherwise if all robots are at one height."""
+    at_one_height_m = load(name)["position_m"] * (1.0, 1.0, 0.0)
+    return np.argwhere(ours(name, position_m=at_one_height_m) != theirs(name))
 
 
 @all_sets
@@ -84,8 +96,8 @@ def test_there_are_thousands_of_decisions_and_many_packets_decode():
         num_robots = recipient.shape[1]
         decisions += int(np.sum(recipient != np.arange(num_robots))) * (num_robots - 1)
         packets += int(load(name)["decodes"].sum())
-    assert decisions == 21_603
-    assert packets == 1_515
+    assert decisions == 27_474
+    assert packets == 1_850
 
 
 @certain_sets
@@ -103,6 +115,8 @@ def test_the_page_has_the_numbers_of_the_recordings():
         differ = (np.sum(ours(name, factor) != theirs(name)) for factor in (1.0, 1.03, 0.97))
         numbers = [int(number) for cell in row for number in cell.split(",")]
         assert numbers == [int(number) for number in (*pairs, *differ)], name
+    flat = sum(len(apart_at_one_height(name)) for name in ("heights", "heights-street"))
+    assert f"the same height, {flat} receptions would differ" in section
     authors = load("authors")
     is_addressed = authors["recipient"][:, :, None] == np.arange(20)
     while_sending = authors["decodes_if_silent"] & is_addressed & ~authors["decodes"]
@@ -115,6 +129,15 @@ def test_a_threshold_wrong_by_three_per_cent_disagrees(factor):
     mismatches = [np.sum(ours(name, factor) != theirs(name)) for name in CERTAIN]
     assert sum(mismatches) >= 10
     assert sum(count > 0 for count in mismatches) >= 4
+
+
+@pytest.mark.parametrize("name", ["heights", "heights-street"])
+def test_robots_of_these_sets_fly_and_without_their_heights_we_disagree(name):
+    """Heights are spread from 5 to 120 m; where all are the same, other packets decode."""
+    position_m = load(name)["position_m"]
+    quartiles_m = np.quantile(position_m[..., 2], [0.0, 0.25, 0.5, 0.75, 1.0])
+    np.testing.assert_allclose(quartiles_m, [5.0, 33.75, 62.5, 91.25, 120.0], atol=7.0)
+    assert len(apart_at_one_height(name)) >= 15
 
 
 def test_what_ns3_says_otherwise_than_it_did_is_counted(capsys):
@@ -206,10 +229,21 @@ def test_as_many_packets_decode_over_rayleigh_fading_as_in_ns3():
 
 FAST = paper("random-walk", num_robots=10, num_windows=60, velocity_ratio=0.9)
 SMALL = ns3.Scenes(mission=FAST)
+HIGH = paper(
+    "random-walk",
+    num_robots=10,
+    num_windows=20,
+    robot="quadrotor",
+    height_m=5.0,
+    height_range_m=115.0,
+)
 
 
 class StandIn:
-    """Answers in place of ns-3, by the rules of ns-2's traces and SINR in free space."""
+    """Answers in place of ns-3, by the rules of ns-2's traces and SINR in free space.
+
+    In its traces robots stay at their first height.
+    """
 
     def said_by(self, _, lines):
         answers = []
@@ -226,18 +260,17 @@ class StandIn:
 
     def moves(self, trace, num_robots, times):
         """Where the robots are at each time, of a trace whose legs end before others begin."""
-        place_m = np.zeros((len(times), num_robots, 2))
-        from_m = np.zeros((num_robots, 2))
+        place_m = np.zeros((len(times), num_robots, 3))
+        from_m = np.zeros((num_robots, 3))
         for line in Path(trace).read_text().splitlines():
             words = line.replace('"', " ").split()
             if words[0].startswith("$node_"):
                 axis = ("X_", "Y_", "Z_").index(words[2])
-                if axis < 2:
-                    place_m[:, int(words[0][7:-1]), axis] = float(words[3])
-                    from_m[int(words[0][7:-1]), axis] = float(words[3])
+                place_m[:, int(words[0][7:-1]), axis] = float(words[3])
+                from_m[int(words[0][7:-1]), axis] = float(words[3])
             elif words[0] == "$ns_":
                 begin_s, robot = float(words[2]), int(words[3][7:-1])
-                to_m = np.array([float(words[5]), float(words[6])])
+                to_m = np.array([float(words[5]), float(words[6]), from_m[robot, 2]])
                 length_m = np.linalg.norm(to_m - from_m[robot])
                 for k, at_s in enumerate(times):
                     if at_s > begin_s:
@@ -249,7 +282,7 @@ class StandIn:
     def scene(self, num_robots, numbers):
         """Who decodes each sender, who would if it were silent, and the power at everyone [mW]."""
         sends = numbers[:num_robots]
-        place_m = np.array(numbers[num_robots:]).reshape(-1, 2)
+        place_m = np.array(numbers[num_robots:]).reshape(-1, 3)
         length_m = LIGHT_MPS / self.frequency_hz
         power_w = np.zeros((num_robots, num_robots))
         for i in range(num_robots):
@@ -293,6 +326,20 @@ def test_a_flight_that_is_exported_has_our_receptions_elsewhere(flown_apart, cap
     assert said.endswith("receptions; 0 packets differ\n")
     assert int(said.split()[2]) > 100  # packets
     assert int(said.split()[4]) > 100  # receptions
+
+
+def test_a_flight_at_several_heights_has_its_own_places_elsewhere(tmp_path, monkeypatch):
+    """Up to what quadrotors climb or sink as they fly."""
+    monkeypatch.setattr(ns3, "said_by", StandIn().said_by)
+    run = swarm_mj.fly(HIGH, policy="mst")
+    ns3.exported(HIGH, "mst", tmp_path / "a")
+    at_s = [0.1 * row for row in range(20)]
+    found_m = ns3.places(Path("ns3"), tmp_path / "a.tcl", 10, at_s)
+    height_m = run.footage().height_m
+    assert height_m is not None
+    assert np.ptp(height_m[0]) > 60.0
+    np.testing.assert_allclose(found_m[..., :2], run.footage().position_m, atol=1e-4)
+    np.testing.assert_allclose(found_m[..., 2], height_m, atol=0.5)
 
 
 def test_robots_that_stand_still_are_seen(flown_apart):

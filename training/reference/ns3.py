@@ -26,6 +26,7 @@ import numpy as np
 import swarm_mj
 from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper, reference
+from swarm_mj.mission.geometry import PLANE, SPACE
 from swarm_mj.radio.free_space import path_loss_db
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.replay.export.formats import files_of
@@ -87,6 +88,25 @@ SETS = {
         num_scenes=300,
         is_repeated=True,
     ),
+    # Robots from 5 to 120 m above the floor; the last set's path loss is that of "street".
+    "heights": Scenes(
+        mission=paper(
+            "stationary", num_robots=20, robot="quadrotor", height_m=5.0, height_range_m=115.0
+        ),
+    ),
+    "heights-street": Scenes(
+        mission=paper(
+            "stationary",
+            num_robots=20,
+            robot="quadrotor",
+            height_m=5.0,
+            height_range_m=115.0,
+            path_loss="log-distance",
+            loss_exponent=2.1,
+            reference_m=1.0,
+        ),
+        law="log-distance 1 2.1",
+    ),
 }
 
 
@@ -115,6 +135,20 @@ FLIGHTS = {
                 range_ratio=0.5,
             ),
             law="log-distance 20 3",
+        ),
+    ),
+    # In ns-3 they stay at their first height, which they leave by centimetres here.
+    "heights": (
+        "planner",
+        Scenes(
+            mission=paper(
+                "flocking",
+                num_robots=20,
+                num_windows=200,
+                robot="quadrotor",
+                height_m=5.0,
+                height_range_m=115.0,
+            )
         ),
     ),
 }
@@ -183,14 +217,16 @@ def radio_numbers(mission: Mission) -> tuple[float, float, float, float]:
 
 
 def decided(program: Path, scenes: Scenes, position_m: np.ndarray, recipient: np.ndarray) -> Arrays:
-    """Return what ns-3 decides of slots, by the robots' places [k, i, 2] and recipients [k, i]."""
+    """Return what ns-3 decides of slots, by the robots' places [k, i, D] and recipients [k, i]."""
     num_robots = scenes.mission.num_robots
+    flat = ((0, 0), (0, 0), (0, SPACE - position_m.shape[2]))  # robots in the plane are at height 0
+    place_m = np.pad(position_m, flat)
     is_sender = recipient != np.arange(num_robots)
     fades = int(scenes.mission.fading == "rayleigh")
     numbers = " ".join(map(repr, radio_numbers(scenes.mission)))
     lines = [f"radio {numbers} {fades} {scenes.law}"]
-    for places, sends in zip(position_m, is_sender, strict=True):
-        words = [len(sends), *sends.astype(int).tolist(), *places.ravel().tolist()]
+    for where_m, sends in zip(place_m, is_sender, strict=True):
+        words = [len(sends), *sends.astype(int).tolist(), *where_m.ravel().tolist()]
         lines.append(f"scene {' '.join(map(repr, words))}")
     rows = np.array(said_by(program, lines))
     decodes, decodes_if_silent, received_mw = np.zeros((3, *is_sender.shape, num_robots))
@@ -262,10 +298,10 @@ def flown_apart(program: Path, scenes: Scenes, stem: Path) -> int:
 
 
 def places(program: Path, trace: Path, num_robots: int, at_s: Sequence[float]) -> np.ndarray:
-    """Return where ns-3 has the robots of a trace at these times [k, i, 2] [m]."""
+    """Return where ns-3 has the robots of a trace at these times [k, i, 3] [m]."""
     times = " ".join(map(repr, at_s))
     said = said_by(program, [f"moves {trace} {num_robots} {times}"])
-    return np.array(said).reshape(len(at_s), num_robots, 2)
+    return np.array(said).reshape(len(at_s), num_robots, SPACE)
 
 
 def said_by(program: Path, lines: list[str]) -> list[list[float]]:
@@ -281,7 +317,7 @@ def drawn(scenes: Scenes, rng: np.random.Generator) -> tuple[np.ndarray, np.ndar
     mission, num_robots = scenes.mission, scenes.mission.num_robots
     shape = scenes.num_scenes, num_robots
     half_m = mission.half_side_m
-    position_m = rng.uniform(-half_m, half_m, (*shape, 2))
+    position_m = rng.uniform(-half_m, half_m, (*shape, PLANE))
     recipient = np.tile(np.arange(num_robots), (scenes.num_scenes, 1))
     for row in recipient:
         senders = rng.choice(num_robots, rng.integers(1, MOST_SENDERS + 1), replace=False)
@@ -289,6 +325,10 @@ def drawn(scenes: Scenes, rng: np.random.Generator) -> tuple[np.ndarray, np.ndar
         if mission.half_duplex == "eavesdroppers":  # which needs packets that are addressed
             row[senders] = (senders + rng.integers(1, num_robots, len(senders))) % num_robots
             row[senders[:-1]] = senders[1:]  # and robots that send while they are addressed
+    if mission.has_bodies:
+        highest_m = mission.height_m + mission.height_range_m
+        height_m = rng.uniform(mission.height_m, highest_m, (*shape, 1))
+        position_m = np.concatenate([position_m, height_m], axis=2)
     if scenes.is_repeated:
         position_m[:], recipient[:] = position_m[0], np.arange(num_robots)
         recipient[:, :2] = EVERYONE

@@ -5,7 +5,7 @@
 // nothing of the arithmetic of a reception stands here.
 //
 //   radio POWER_W NOISE_W THRESHOLD HZ FADES LAW [NUMBERS]  the radio of all robots from here on
-//   scene N SENDERS.. X Y ..                                N marks, 1 of a sender; then all places
+//   scene N SENDERS.. X Y Z ..                              N marks, 1 of a sender; then all places
 //   moves FILE N TIMES..                                    where a trace has N robots at times [s]
 
 #include "ns3/core-module.h"
@@ -131,10 +131,10 @@ ReadScene(std::istream& line)
     }
     for (int i = 0; i < num; i++)
     {
-        double x, y;
-        line >> x >> y;
+        double x, y, z;
+        line >> x >> y >> z;
         auto place = CreateObject<ConstantPositionMobilityModel>();
-        place->SetPosition(Vector(x, y, 0.0));
+        place->SetPosition(Vector(x, y, z));
         scene.place.push_back(place);
     }
     NS_ABORT_MSG_IF(line.fail(), "a scene ends too early");
@@ -242,7 +242,7 @@ WriteMoves(std::istream& line)
             for (auto robot = robots.Begin(); robot != robots.End(); ++robot)
             {
                 auto place = (*robot)->GetObject<MobilityModel>()->GetPosition();
-                std::cout << place.x << ' ' << place.y << ' ';
+                std::cout << place.x << ' ' << place.y << ' ' << place.z << ' ';
             }
             std::cout << '\n';
         });

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal, NamedTuple, TypeAlias
 
 import numpy as np
@@ -10,6 +11,7 @@ from jaxtyping import Float, Int
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
 from swarm_mj.replay.footage import Footage
+from swarm_mj.replay.links import lifted
 from swarm_mj.replay.log import REQUEST
 
 DIGITS = 6  # after the point, of metres, seconds and windows: replays keep less
@@ -73,13 +75,22 @@ class FlownWindows:
         """Return when a window ends, by the mission's time [s]."""
         return round(int(self.footage.window[row]) * self.window_s, DIGITS)
 
-    def velocity_mps(self, row: int) -> Float[np.ndarray, "N 2"]:
+    @property
+    def has_bodies(self) -> bool:
+        """True if robots have heights; points are all at 0 m."""
+        return self.footage.height_m is not None
+
+    @cached_property
+    def place_m(self) -> Float[np.ndarray, "T N 3"]:
+        """Where robots are in space [m]."""
+        return lifted(self.footage.position_m, self.footage.above(0.0))
+
+    def velocity_mps(self, row: int) -> Float[np.ndarray, "N 3"]:
         """Return the way since the window before over its time [m/s]; nan in the first window."""
         # Replays draw headings, all of one length, and keep no speeds.
-        position_m = self.footage.position_m
         if row == 0:
-            return np.full_like(position_m[row], np.nan)
-        return (position_m[row] - position_m[row - 1]) / self.window_s
+            return np.full_like(self.place_m[row], np.nan)
+        return (self.place_m[row] - self.place_m[row - 1]) / self.window_s
 
     def packets(self, row: int) -> Iterator[SentPacket]:
         """Yield the packets of a window, in the order of slots and senders."""

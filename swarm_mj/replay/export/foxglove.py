@@ -88,12 +88,19 @@ SCHEMAS: dict[str, Mapping[str, Mapping[str, Any]]] = {
         "known": _list_of(SOME_NUMBER, "age of what it knows about each robot; null: nothing"),
     },
 }
+# What is added of robots with bodies.
+UPWARD: dict[str, Mapping[str, Mapping[str, Any]]] = {
+    "/positions": {
+        "z_m": _list_of(NUMBER, "height of each robot above the floor [m]"),
+        "vz_mps": _list_of(SOME_NUMBER, "upwards, as vx_mps [m/s]"),
+    }
+}
 
 
 def recording(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the recording of a flight as the content of an MCAP file."""
     stream = io.BytesIO()
-    out = _Recording(stream)
+    out = _Recording(stream, has_bodies=flown.has_bodies)
     facts = flown.footage.facts
     about = {"policy": facts.policy, "seed": facts.seed, "observer": facts.observer}
     out.describe("flight", about)
@@ -108,7 +115,8 @@ def recording(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
 class _Recording:
     """An MCAP file that is being written: a channel for each topic, as topics come up."""
 
-    def __init__(self, stream: io.BytesIO) -> None:
+    def __init__(self, stream: io.BytesIO, *, has_bodies: bool) -> None:
+        self._has_bodies = has_bodies
         self._writer = Writer(stream)
         self._writer.start(library="swarm-mj")
         self._channels: dict[str, int] = {}
@@ -125,9 +133,11 @@ class _Recording:
         self._add(topic, message.SerializeToString(), at_s)
 
     def json(self, topic: str, message: Mapping[str, object], at_s: float) -> None:
-        """Write a message of our own, which `SCHEMAS` describes."""
+        """Write a message of our own, which `SCHEMAS`, and of bodies `UPWARD`, describe."""
         if topic not in self._channels:
-            properties = SCHEMAS[topic]
+            properties = dict(SCHEMAS[topic])
+            if self._has_bodies:
+                properties.update(UPWARD.get(topic, {}))
             document = {"type": "object", "properties": properties, "required": list(properties)}
             schema = self._writer.register_schema(
                 name=f"swarm_mj.{topic[1:].title()}",
@@ -191,30 +201,43 @@ def _timestamp(at_s: float) -> Timestamp:
 def _transforms(flown: FlownWindows, row: int) -> FrameTransforms:
     """Return the frame of each robot, r0 and so on, in the world's."""
     at = _timestamp(flown.begin_s(row))
+    turns = _turns(flown, row)
     transforms: list[FrameTransform] = []
-    for robot, (x_m, y_m) in enumerate(flown.footage.position_m[row].tolist()):
+    for robot, (x_m, y_m, z_m) in enumerate(flown.place_m[row].tolist()):
         transforms.append(
             FrameTransform(
                 timestamp=at,
                 parent_frame_id=WORLD,
                 child_frame_id=f"r{robot}",
-                translation=Vector3(x=x_m, y=y_m),
-                rotation=UPRIGHT,
+                translation=Vector3(x=x_m, y=y_m, z=z_m),
+                rotation=turns[robot],
             )
         )
     return FrameTransforms(transforms=transforms)
 
 
+def _turns(flown: FlownWindows, row: int) -> list[Quaternion]:
+    """Return how each robot is turned; points are upright."""
+    attitude = flown.footage.attitude
+    if attitude is None:
+        return [UPRIGHT] * flown.num_robots
+    return [Quaternion(w=w, x=x, y=y, z=z) for w, x, y, z in attitude[row].tolist()]
+
+
 def _positions(flown: FlownWindows, row: int) -> dict[str, object]:
-    x_m, y_m = flown.footage.position_m[row].T
-    vx_mps, vy_mps = flown.velocity_mps(row).T
-    return {
+    x_m, y_m, z_m = flown.place_m[row].T
+    vx_mps, vy_mps, vz_mps = flown.velocity_mps(row).T
+    positions: dict[str, object] = {
         "x_m": _numbers(x_m),
         "y_m": _numbers(y_m),
         "vx_mps": _numbers(vx_mps),
         "vy_mps": _numbers(vy_mps),
         "is_on": flown.footage.is_on[row].tolist(),
     }
+    if flown.has_bodies:
+        positions["z_m"] = _numbers(z_m)
+        positions["vz_mps"] = _numbers(vz_mps)
+    return positions
 
 
 def _numbers(values: Sequence[float] | np.ndarray) -> list[float | None]:
@@ -227,13 +250,13 @@ def _bodies(flown: FlownWindows, row: int) -> SceneEntity:
     radius_m = RADIUS_SHARE * footage.ground.reach_m
     size = Vector3(x=2.0 * radius_m, y=2.0 * radius_m, z=radius_m)
     cylinders: list[CylinderPrimitive] = []
-    for (x_m, y_m), colour in zip(
-        footage.position_m[row].tolist(), footage.colours[row].tolist(), strict=True
-    ):
-        place = Vector3(x=x_m, y=y_m, z=0.5 * radius_m)
+    places_m = flown.place_m[row].tolist()
+    colours = footage.colours[row].tolist()
+    for (x_m, y_m, z_m), turn, colour in zip(places_m, _turns(flown, row), colours, strict=True):
+        place = Vector3(x=x_m, y=y_m, z=z_m + 0.5 * radius_m)
         cylinders.append(
             CylinderPrimitive(
-                pose=Pose(position=place, orientation=UPRIGHT),
+                pose=Pose(position=place, orientation=turn),
                 size=size,
                 bottom_scale=1.0,
                 top_scale=1.0,
@@ -252,14 +275,14 @@ def _packet_lines(
     flown: FlownWindows, row: int, packets: Sequence[SentPacket], at_s: float
 ) -> SceneEntity:
     """Return the packets of one slot as lines; each update replaces those of the slot before."""
-    height_m = RADIUS_SHARE * flown.footage.ground.reach_m
+    above_m = RADIUS_SHARE * flown.footage.ground.reach_m  # its robots' places
     points: list[Point3] = []
     colours: list[Color] = []
     for packet in packets:
         colour = _color(COLOURS[packet.fate])
-        for start_m, end_m in _ways(flown.footage.position_m[row], packet):
-            for x_m, y_m in (start_m, end_m):
-                points.append(Point3(x=x_m, y=y_m, z=height_m))
+        for start_m, end_m in _ways(flown.place_m[row], packet):
+            for x_m, y_m, z_m in (start_m, end_m):
+                points.append(Point3(x=x_m, y=y_m, z=z_m + above_m))
                 colours.append(colour)
     lines: list[LinePrimitive] = []
     if points:
@@ -276,9 +299,9 @@ def _packet_lines(
     return SceneEntity(timestamp=_timestamp(at_s), frame_id=WORLD, id="packets", lines=lines)
 
 
-def _ways(position_m: np.ndarray, packet: SentPacket) -> Iterator[tuple[list[float], list[float]]]:
+def _ways(place_m: np.ndarray, packet: SentPacket) -> Iterator[tuple[list[float], list[float]]]:
     """Yield the lines of a packet: to its recipient, or to all that decoded a broadcast."""
-    start_m = position_m[packet.sender]
+    start_m = place_m[packet.sender]
     ends = packet.receivers
     share = 1.0
     if packet.fate not in ("heard", "unheard") and packet.recipient is not None:
@@ -286,7 +309,7 @@ def _ways(position_m: np.ndarray, packet: SentPacket) -> Iterator[tuple[list[flo
         if packet.fate in ("lost", "unanswered"):  # it stops short of the recipient
             share = palette.LOST_SHARE
     for end in ends:
-        yield start_m.tolist(), (start_m + share * (position_m[end] - start_m)).tolist()
+        yield start_m.tolist(), (start_m + share * (place_m[end] - start_m)).tolist()
 
 
 def _color(colour: Sequence[int]) -> Color:

@@ -3,7 +3,9 @@
 In a window the robots of the simulation move first, and then stand while two slots pass. So a trace
 has each robot in place when either slot begins: it goes to its next place during the second one,
 after the packets of that slot have begun. A simulator that decides a reception by where the robots
-are when a packet begins, as ns-3's channels do, so decides it where ours did.
+are when a packet begins, as ns-3's channels do, so decides it where ours did. `setdest` is planar,
+so robots with bodies stay at the height where they begin: where ns-3 is made to set a height later,
+it forgets the way on the ground.
 """
 
 from collections.abc import Callable, Iterator
@@ -39,12 +41,11 @@ def _about(flown: FlownWindows) -> Iterator[str]:
 
 
 def _start(flown: FlownWindows) -> Iterator[str]:
-    heights_m = flown.footage.height_m  # ns-2's robots stay at the height where they begin
-    for robot, (x_m, y_m) in enumerate(flown.footage.position_m[0].tolist()):
+    for robot, (x_m, y_m, z_m) in enumerate(flown.place_m[0].tolist()):
         yield f"$node_({robot}) set X_ {x_m:.{DIGITS}f}"
         yield f"$node_({robot}) set Y_ {y_m:.{DIGITS}f}"
-        up_m = 0.0 if heights_m is None else heights_m[0, robot]
-        yield f"$node_({robot}) set Z_ {up_m:.{DIGITS}f}" if up_m else f"$node_({robot}) set Z_ 0.0"
+        height = f"{z_m:.{DIGITS}f}" if flown.has_bodies else "0.0"
+        yield f"$node_({robot}) set Z_ {height}"
 
 
 def _legs(flown: FlownWindows, row: int) -> Iterator[str]:

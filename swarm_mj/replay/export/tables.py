@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterable
 from swarm_mj.replay.export.flown import FlownWindows, number
 
 POSITION_COLUMNS = ("window", "seconds", "robot", "x_m", "y_m", "vx_mps", "vy_mps", "is_on")
+UPWARD_COLUMNS = ("z_m", "vz_mps")  # of robots with bodies, after the others
 PACKET_COLUMNS = (
     *("window", "slot", "seconds", "sender", "recipient", "fate", "num_receivers", "receivers"),
 )
@@ -34,13 +35,17 @@ class CsvTable:
 
 def positions_table(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
     """Return the table of positions and velocities: a row for each window and robot."""
-    table = CsvTable(POSITION_COLUMNS)
+    columns = POSITION_COLUMNS
+    if flown.has_bodies:
+        columns += UPWARD_COLUMNS
+    table = CsvTable(columns)
     footage = flown.footage
     for row, window in enumerate(footage.window.tolist()):
         seconds = flown.begin_s(row)
         velocity_mps = flown.velocity_mps(row)
-        for robot, (x_m, y_m) in enumerate(footage.position_m[row].tolist()):
-            vx_mps, vy_mps = velocity_mps[robot]
+        for robot, (x_m, y_m, z_m) in enumerate(flown.place_m[row].tolist()):
+            vx_mps, vy_mps, vz_mps = velocity_mps[robot]
+            upwards = (number(z_m), number(vz_mps)) if flown.has_bodies else ()
             table.add(
                 window,
                 seconds,
@@ -50,6 +55,7 @@ def positions_table(flown: FlownWindows, advance: Callable[[], None]) -> bytes:
                 number(vx_mps),
                 number(vy_mps),
                 int(footage.is_on[row, robot]),
+                *upwards,
             )
         advance()
     return table.content

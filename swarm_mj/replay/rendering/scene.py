@@ -10,7 +10,7 @@ from weakref import ref
 import mujoco._functions as functions  # private: type checkers see it only there
 import numpy as np
 from jaxtyping import Float, UInt8
-from mujoco._enums import mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
+from mujoco._enums import mjtCamera, mjtCatBit, mjtFontScale, mjtFramebuffer, mjtObj
 from mujoco._errors import FatalError
 from mujoco._render import MjrContext, mjr_readPixels, mjr_render, mjr_setBuffer
 from mujoco._specs import MjSpec
@@ -26,17 +26,23 @@ from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.rendering import markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
 from swarm_mj.replay.rendering.theme import DARK, Theme
+from swarm_mj.replay.view import CHASE, MAP
 
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
 TILE_M = 200.0  # the floor's texture, two squares by two, assets/arena.xml
+SMALLER = 20.0  # times, seen from nearby: squares of 5 m say how fast a robot flies
 GROUND = 10.0  # an open floor's side, by the area's: a team that flies apart has left the area
 # What faces up has its own colour exactly, what stands upright half of it.
 AMBIENT = 0.5
 SUN = 0.5
+NOON = (0.0, 0.0, -1.0)
+AFTERNOON = (0.55, 0.45, -0.7)  # from nearby, it tells the sides of things apart
 WALL_OPACITY = 0.3  # what stands in front hides no robot
 OBSTACLE_OPACITY = 0.35  # likewise
+NEAR_OPACITY = 0.75  # of obstacles seen from nearby
 SLICES = 14  # of round things, around
 STACKS = 5  # and along their axis
+ROUNDER = 3  # times as many pieces, from nearby
 WINDOW = (1280, 720)  # that sizes on the window are meant for [pixels]
 NO_WINDOW = 'the window needs a display; without one, render_mode="rgb_array" draws pictures'
 CLOSING_S = 5.0  # what the window may take to close
@@ -57,13 +63,18 @@ class SceneRenderer(ExitStack):
         *,
         scene: Scene | None = None,
         theme: Theme = DARK,
+        camera: str = MAP,
     ) -> None:
-        """Compile the scene for pictures of this size [pixels]; OSError if no OpenGL works here."""
+        """Compile the scene for pictures of this size [pixels] by a camera of `CAMERAS`.
+
+        Raises OSError if no OpenGL works here.
+        """
         super().__init__()
         self._size = (width, height)
         self._mission = mission
         self._theme = theme
-        self._model = pictured(mission, scene, width, height, theme)
+        self._chases = camera == CHASE
+        self._model = pictured(mission, scene, width, height, theme, is_near=self._chases)
         self._kinds = kinds_of(mission) if mission.has_bodies else []
         self._data = MjData(self._model)
         self._floor = functions.mj_name2id(self._model, mjtObj.mjOBJ_GEOM.value, "floor")
@@ -84,13 +95,18 @@ class SceneRenderer(ExitStack):
             self.callback(step)
         atexit.register(_close, ref(self))  # before the back end ends, which registered earlier
 
-    def camera(self, footage: Footage, row: int = 0) -> markers.Camera:
-        """Return the camera by which a window's picture is seen."""
-        return markers.look_at(footage.ground, row, *self._size)
+    def camera(self, footage: Footage, moment: float = 0) -> markers.Camera:
+        """Return the camera by which a picture is seen, at a moment in windows from 0."""
+        if self._chases:
+            return markers.chase(footage, moment, *self._size)
+        return markers.look_at(footage.ground, round(moment), *self._size)
 
-    def frame(self, footage: Footage, row: int = 0) -> UInt8[np.ndarray, "H W 3"]:
-        """Return the picture of a window, counted from 0: RGB, its first row on top."""
+    def frame(self, footage: Footage, moment: float = 0) -> UInt8[np.ndarray, "H W 3"]:
+        """Return the picture of a moment, in windows from 0: RGB, its first row on top."""
         width, height = self._size
+        camera = self.camera(footage, moment)
+        row = round(moment)
+        footage = footage.moved_to(moment)
         data = self._data
         data.qpos[:] = _pose(footage, row, self._kinds)
         functions.mj_kinematics(self._model, data)
@@ -100,7 +116,6 @@ class SceneRenderer(ExitStack):
             # By whole tiles, so that the pattern stands still under a team that flies on.
             tiles = np.round(footage.ground.centre_m[row] / TILE_M)
             data.geom_xpos[self._floor, :2] = TILE_M * tiles
-        camera = self.camera(footage, row)
         free = MjvCamera()
         camera.aim(free)
         kinds = mjtCatBit.mjCAT_ALL.value
@@ -120,6 +135,15 @@ def _close(renderer: "ref[SceneRenderer]") -> None:
         left.close()
 
 
+def _base_of(robot: int, kinds: Sequence[RobotKind]) -> int:
+    """Return MuJoCo's number of a robot's base; points, which have no kinds, are one body each."""
+    sizes = [1] * robot
+    for kind in kinds:
+        each = kind.model.nbody - 1  # without the world
+        sizes[kind.first : kind.first + kind.num_robots] = [each] * kind.num_robots
+    return 1 + sum(sizes[:robot])
+
+
 def _pose(footage: Footage, row: int, kinds: Sequence[RobotKind]) -> Float[np.ndarray, "Q"]:
     """Return MuJoCo's coordinates of a window's robots."""
     if footage.height_m is None or footage.attitude is None:
@@ -129,42 +153,65 @@ def _pose(footage: Footage, row: int, kinds: Sequence[RobotKind]) -> Float[np.nd
 
 
 def pictured(
-    mission: Mission, scene: Scene | None, width: int, height: int, theme: Theme = DARK
+    mission: Mission,
+    scene: Scene | None,
+    width: int,
+    height: int,
+    theme: Theme = DARK,
+    *,
+    is_near: bool = False,
 ) -> MjModel:
     """Compile a mission's scene for pictures of this size [pixels].
 
     Light comes from above, walls and obstacles are of glass, and an open area's floor is as wide
-    as a camera sees.
+    as a camera sees. From nearby, its squares are smaller.
     """
     spec = compose(mission, scene=scene)
-    half_m = float(np.ceil(GROUND * mission.half_side_m / TILE_M) * TILE_M)
     _paint(spec, theme)
-    # By name, if they are there: a user's scene may have neither.
-    for material in spec.materials:
-        if material.name == "wall":
-            material.rgba[3] = WALL_OPACITY
-        elif material.name == "floor" and not mission.has_walls:
-            material.texrepeat = [2.0 * half_m / TILE_M] * 2
-    for geom in spec.geoms:
-        if geom.name == "floor" and not mission.has_walls:
-            geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
+    _widen_floor(spec, mission, times=SMALLER if is_near else 1.0)
     model = spec.compile()
     visual = model.vis
     visual.global_.offwidth = width
     visual.global_.offheight = height
-    visual.global_.fovy = markers.FOV_Y_DEG
-    visual.quality.numslices = SLICES
-    visual.quality.numstacks = STACKS
+    _set_view(model, is_near=is_near)
+    for g in obstacle_geoms(model):
+        material = model.geom_matid[g]
+        colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
+        colour[3] = min(colour[3], NEAR_OPACITY if is_near else OBSTACLE_OPACITY)
+    return model
+
+
+def _widen_floor(spec: MjSpec, mission: Mission, times: float) -> None:
+    """Make an open area's floor wide, and walls of glass; squares are `times` smaller."""
+    half_m = float(np.ceil(GROUND * mission.half_side_m / TILE_M) * TILE_M)
+    # By name, if they are there: a user's scene may have neither.
+    for material in spec.materials:
+        if material.name == "wall":
+            material.rgba[3] = WALL_OPACITY
+        elif material.name == "floor":
+            repeats = np.array(material.texrepeat)
+            if not mission.has_walls:
+                repeats = np.full(2, 2.0 * half_m / TILE_M)
+            material.texrepeat = (times * repeats).tolist()
+    for geom in spec.geoms:
+        if geom.name == "floor" and not mission.has_walls:
+            geom.size = [half_m, half_m, half_m / 10.0]  # drawn in 20 by 20 pieces
+
+
+def _set_view(model: MjModel, *, is_near: bool) -> None:
+    """Set lens, light and roundness, from nearby or for the map."""
+    visual = model.vis
+    visual.global_.fovy = markers.CHASE_FOV_Y_DEG if is_near else markers.FOV_Y_DEG
+    if is_near:
+        visual.map.znear = markers.CHASE_NEAR_M / model.stat.extent
+    rounder = ROUNDER if is_near else 1
+    visual.quality.numslices = rounder * SLICES
+    visual.quality.numstacks = rounder * STACKS
     visual.headlight.ambient[:] = AMBIENT
     visual.headlight.diffuse[:] = 0.0
     model.light_diffuse[:] = SUN
     model.light_ambient[:] = 0.0
-    model.light_dir[:] = (0.0, 0.0, -1.0)
-    for g in obstacle_geoms(model):
-        material = model.geom_matid[g]
-        colour = model.geom_rgba[g] if material < 0 else model.mat_rgba[material]
-        colour[3] = min(colour[3], OBSTACLE_OPACITY)
-    return model
+    model.light_dir[:] = AFTERNOON if is_near else NOON
 
 
 def _paint(spec: MjSpec, theme: Theme) -> None:
@@ -188,8 +235,12 @@ def _shares(colour: Colour) -> list[float]:
 class SceneViewer:
     """MuJoCo's passive viewer, with robots and packets; to close the window ends the view alone."""
 
-    def __init__(self, mission: Mission, *, scene: Scene | None = None) -> None:
-        """Open the window; raise OSError without a display, or if it is closed already."""
+    def __init__(self, mission: Mission, *, scene: Scene | None = None, camera: str = MAP) -> None:
+        """Open the window; raise OSError without a display, or if it is closed already.
+
+        It is first seen by a camera of `CAMERAS`. One that chases stays with its robot, while the
+        user turns it and comes nearer.
+        """
         import glfw  # both look for a display when they are imported
         from mujoco import viewer
 
@@ -197,7 +248,8 @@ class SceneViewer:
             warnings.simplefilter("ignore")
             if not glfw.init():  # MuJoCo's viewer would wait forever
                 raise OSError(NO_WINDOW)
-        self._model = pictured(mission, scene, *WINDOW)
+        self._chases = camera == CHASE
+        self._model = pictured(mission, scene, *WINDOW, is_near=self._chases)
         self._kinds = kinds_of(mission) if mission.has_bodies else []
         self._data = MjData(self._model)
         others = set(threading.enumerate())
@@ -214,21 +266,44 @@ class SceneViewer:
         self._markers = markers
         self._is_aimed = False
 
-    def show(self, footage: Footage) -> None:
-        """Show the footage's first window from now on."""
-        if not self._window.is_running():
+    @property
+    def is_open(self) -> bool:
+        """True until the window is closed."""
+        return self._window.is_running()
+
+    def show(self, footage: Footage, moment: float = 0) -> None:
+        """Show a moment of the footage from now on, in windows from 0."""
+        if not self.is_open:
             return
-        camera = markers.look_at(footage.ground, 0, *WINDOW)
+        row = round(moment)
+        footage = footage.moved_to(moment)
         with self._window.lock():
-            if not self._is_aimed:  # from then on it is the user's
-                camera.aim(self._window.cam)
-                self._window.opt.geomgroup[BEACONS] = 0
-                self._is_aimed = True
-            self._data.qpos[:] = _pose(footage, 0, self._kinds)
+            camera = self._camera(footage, row)
+            self._data.qpos[:] = _pose(footage, row, self._kinds)
             functions.mj_forward(self._model, self._data)
             self._markers.ngeom = 0
-            markers.draw_markers(self._markers, footage, 0, camera)
+            markers.draw_markers(self._markers, footage, row, camera)
         self._window.sync()
+
+    def _camera(self, footage: Footage, row: int) -> markers.Camera:
+        """Return the camera by which markers are drawn; the first time, aim the window's so."""
+        free = self._window.cam
+        if not self._chases:
+            camera = markers.look_at(footage.ground, row, *WINDOW)
+        else:
+            camera = markers.chase(footage, row, *WINDOW)
+        if not self._is_aimed:  # from then on it is the user's
+            camera.aim(free)
+            if self._chases:
+                free.type = mjtCamera.mjCAMERA_TRACKING.value
+                free.trackbodyid = _base_of(footage.ego, self._kinds)
+            self._window.opt.geomgroup[BEACONS] = 0
+            self._is_aimed = True
+        if self._chases:
+            camera = camera._replace(
+                distance_m=free.distance, azimuth_deg=free.azimuth, elevation_deg=-free.elevation
+            )
+        return camera
 
     def close(self) -> None:
         """Close the window and wait for its threads: a process that ends earlier may crash."""

@@ -17,7 +17,7 @@ from swarm_mj.replay.links import lifted
 from swarm_mj.replay.rendering import drawing
 from swarm_mj.replay.rendering.scene import SceneRenderer
 from swarm_mj.replay.rendering.theme import THEMES
-from swarm_mj.replay.view import DEFAULTS, GIF, VideoStyle, fitted
+from swarm_mj.replay.view import CHASE, DEFAULTS, GIF, VideoStyle, fitted
 
 Picture = UInt8[np.ndarray, "H W 3"]
 
@@ -42,6 +42,7 @@ class Movie(ExitStack):
         scale = min(each.facts.full_scale for each in footages)
         self._footages = [replace(x, facts=replace(x.facts, full_scale=scale)) for x in footages]
         self._num_frames = style.num_frames
+        self._chases = style.camera == CHASE
         width = style.width
         height = style.height
         bottom = height - round(STRIPS[len(footages) - 1] * height)
@@ -59,9 +60,9 @@ class Movie(ExitStack):
         draw = ImageDraw.Draw(self._empty)
         drawing.draw_legend(draw, self._footages, legend, self._text, theme)
         self._plot.draw_axes(draw)
-        # Two scenes are narrow: titles would cover them.
+        # Two scenes are narrow, and one seen from nearby is full: titles would cover them.
         heights = [drawing.title_height(each, self._text) for each in footages]
-        self._scene_top = max(heights) if len(footages) > 1 else 0
+        self._scene_top = max(heights) if len(footages) > 1 or self._chases else 0
         with ExitStack() as opened:  # closes the first renderer if the second does not start
             self._renderers: list[SceneRenderer] = []
             for each, box in zip(footages, self._boxes, strict=True):
@@ -71,27 +72,35 @@ class Movie(ExitStack):
                     height=bottom - self._scene_top,
                     scene=each.scene,
                     theme=theme,
+                    camera=style.camera,
                 )
                 self._renderers.append(opened.enter_context(renderer))
             self.push(opened.pop_all())
 
     def __iter__(self) -> Iterator[Picture]:
         lengths = [len(each.window) for each in self._footages]
-        rows = np.linspace(0, max(lengths) - 1, self._num_frames).round().astype(int).tolist()
-        for row in rows:  # a mission that is over stands still
-            yield self.picture([min(row, length - 1) for length in lengths])
+        moments = np.linspace(0, max(lengths) - 1, self._num_frames)
+        if not self._chases:  # from nearby, robots that moved once a window would jump
+            moments = moments.round()
+        for moment in moments.tolist():  # a mission that is over stands still
+            yield self.picture([min(moment, length - 1) for length in lengths])
 
-    def picture(self, rows: Sequence[int]) -> Picture:
-        """Return the picture of these windows, one of each mission, from 0."""
+    def picture(self, moments: Sequence[float]) -> Picture:
+        """Return the picture of these moments, one of each mission, in windows from 0."""
+        rows = [round(moment) for moment in moments]
         picture = self._empty.copy()
         draw = ImageDraw.Draw(picture)
         theme = self._theme
-        parts = zip(self._footages, rows, self._boxes, self._renderers, theme.curves, strict=False)
-        for footage, row, box, renderer, curve in parts:
-            picture.paste(
-                Image.fromarray(renderer.frame(footage, row)), (box.left, self._scene_top)
-            )
+        parts = zip(
+            self._footages, moments, self._boxes, self._renderers, theme.curves, strict=False
+        )
+        for footage, moment, box, renderer, curve in parts:
+            row = round(moment)
+            scene = Image.fromarray(renderer.frame(footage, moment))
+            picture.paste(scene, (box.left, self._scene_top))
             drawing.draw_title(draw, footage, row, box, self._text, curve, theme)
+            if self._chases:  # from nearby, most robots are behind the camera or far
+                continue
             ground_m = lifted(footage.position_m[row], 0.0)
             robots = renderer.camera(footage, row).pixels(ground_m) + np.array(
                 [box.left, self._scene_top]

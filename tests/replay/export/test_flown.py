@@ -78,7 +78,26 @@ def test_windows_of_100_ms_have_slots_of_50_ms(requests):
 def test_velocities_are_the_way_over_a_window(requests, two_way):
     assert np.all(np.isnan(requests.velocity_mps(0)))
     way_m = two_way.log.position_m[5] - two_way.log.position_m[4]
-    np.testing.assert_allclose(requests.velocity_mps(5), way_m / 0.1, atol=2e-3)
+    np.testing.assert_allclose(requests.velocity_mps(5)[:, :2], way_m / 0.1, atol=2e-3)
+    assert np.all(requests.velocity_mps(5)[:, 2] == 0.0)
+
+
+def test_bodies_have_heights(bodies, high):
+    """Rovers stay on the floor, their base 12.5 cm above it."""
+    np.testing.assert_allclose(bodies.place_m[..., 2], high.log.height_m, atol=1e-4)
+    assert np.ptp(bodies.place_m[:, :10, 2]) > 30.0
+    np.testing.assert_allclose(bodies.place_m[:, 10:, 2], 0.125, atol=1e-6)
+
+
+def test_bodies_that_climb_0_2_m_in_0_1_s_have_a_velocity_of_2_mps_upwards(climbing, bodies):
+    velocity_mps = climbing.velocity_mps(20)
+    np.testing.assert_allclose(velocity_mps[:, 2], 2.0, atol=1e-9)
+    np.testing.assert_array_equal(velocity_mps[:, :2], bodies.velocity_mps(20)[:, :2])
+
+
+def test_points_are_on_the_ground(requests):
+    assert not requests.has_bodies
+    assert np.all(requests.place_m[..., 2] == 0.0)
 
 
 def test_ages_are_the_team_s_and_the_observer_s(requests, two_way):

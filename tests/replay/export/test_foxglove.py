@@ -18,6 +18,11 @@ def content(requests):
     return recording(requests, lambda: None)
 
 
+@pytest.fixture(scope="module")
+def flown_high(bodies):
+    return recording(bodies, lambda: None)
+
+
 def read(content, topic):
     """The messages of a topic, each with its time [s]."""
     reader = make_reader(io.BytesIO(content), decoder_factories=[DecoderFactory()])
@@ -73,6 +78,69 @@ def test_transforms_and_positions_are_where_the_robots_were(content, two_way):
         np.testing.assert_allclose(message["x_m"], log.position_m[k, :, 0], atol=1e-4)
         np.testing.assert_allclose(message["y_m"], log.position_m[k, :, 1], atol=1e-4)
         assert message["is_on"] == [True] * 12
+
+
+def test_points_are_upright_on_the_ground_and_have_no_heights(content):
+    for _, message in read(content, "/tf"):
+        for each in message.transforms:
+            assert each.translation.z == 0.0
+            turn = each.rotation
+            assert (turn.w, turn.x, turn.y, turn.z) == (1.0, 0.0, 0.0, 0.0)
+    for _, message in read(content, "/positions"):
+        assert list(message) == ["window", "x_m", "y_m", "vx_mps", "vy_mps", "is_on"]
+
+
+def test_bodies_are_at_their_heights_and_turned_as_they_were(flown_high, high):
+    """MuJoCo's quaternions begin with the real part."""
+    log = high.log
+    num_tilted = 0
+    for k, (_, message) in enumerate(read(flown_high, "/tf")):
+        found_m = [each.translation.z for each in message.transforms]
+        np.testing.assert_allclose(found_m, log.height_m[k], atol=1e-4)
+        turns = [each.rotation for each in message.transforms]
+        found = [(turn.w, turn.x, turn.y, turn.z) for turn in turns]
+        np.testing.assert_allclose(found, log.attitude[k], atol=1e-5)
+        num_tilted += sum(turn.w < 0.9999 for turn in turns)
+    assert num_tilted > 0
+
+
+def test_positions_of_bodies_have_heights_and_a_schema_that_says_so(climbing):
+    """They climb 0.2 m in each window of 0.1 s."""
+    content = recording(climbing, lambda: None)
+    start_m = climbing.footage.height_m[0]
+    for k, (_, message) in enumerate(read(content, "/positions")):
+        assert list(message)[-2:] == ["z_m", "vz_mps"]
+        np.testing.assert_allclose(message["z_m"], start_m + 0.2 * k, atol=1e-5)
+        if k > 0:
+            np.testing.assert_allclose(message["vz_mps"], 2.0, atol=1e-6)
+    (schema,) = (
+        json.loads(each.data)
+        for each in make_reader(io.BytesIO(content)).get_summary().schemas.values()
+        if each.name == "swarm_mj.Positions"
+    )
+    assert schema["required"][-2:] == ["z_m", "vz_mps"]
+
+
+def test_discs_and_lines_of_bodies_are_at_their_heights(flown_high, bodies):
+    """A little above: half a disc's height, and a whole one for lines."""
+    above_m = 0.02 * bodies.footage.ground.reach_m
+    num_lines = 0
+    for number, (_, message) in enumerate(read(flown_high, "/scene")):
+        k, slot = divmod(number, 2)
+        height_m = bodies.place_m[k, :, 2]
+        sent = [packet for packet in bodies.packets(k) if packet.slot == slot]
+        for entity in message.entities:
+            if entity.id == "robots":
+                found_m = [each.pose.position.z for each in entity.cylinders]
+                np.testing.assert_allclose(found_m, height_m + 0.5 * above_m, atol=1e-9)
+                turns = [each.pose.orientation.w for each in entity.cylinders]
+                np.testing.assert_allclose(turns, bodies.footage.attitude[k, :, 0], atol=1e-9)
+            for line in entity.lines:
+                starts_m = [point.z for point in line.points[::2]]
+                senders = [packet.sender for packet in sent]
+                np.testing.assert_allclose(starts_m, height_m[senders] + above_m, atol=1e-9)
+                num_lines += len(starts_m)
+    assert num_lines > 0
 
 
 def test_packets_are_those_of_the_flight(content, requests):

@@ -55,6 +55,14 @@ def test_each_robot_is_in_place_when_either_slot_of_a_window_begins(requests, tw
                 np.testing.assert_allclose(found_m, expected_m, atol=1e-3)
 
 
+def test_bodies_begin_at_their_heights_and_stay_there(bodies, high, nothing):
+    """`setdest` has no third axis."""
+    start_m, legs = played(trace(bodies, nothing), 12)
+    np.testing.assert_allclose(start_m[:, 2], high.log.height_m[0], atol=1e-4)
+    assert np.ptp(start_m[:, 2]) > 30.0
+    assert all(len(its) == 29 for its in legs)
+
+
 def test_robots_at_rest_have_no_legs(still_replay, nothing):
     content = trace(read_flown(still_replay), nothing).decode()
     assert "setdest" not in content

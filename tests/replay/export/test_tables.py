@@ -34,6 +34,28 @@ def test_positions_have_a_row_for_each_window_and_robot(requests, two_way, nothi
     assert "(" not in positions_table(requests, nothing).decode()  # no types of NumPy's
 
 
+def test_points_have_the_columns_that_they_always_had(requests, nothing):
+    header, *_ = positions_table(requests, nothing).decode().splitlines()
+    assert header == "window,seconds,robot,x_m,y_m,vx_mps,vy_mps,is_on"
+
+
+def test_bodies_have_their_heights_in_the_last_columns(climbing, nothing):
+    """They climb 0.2 m in each window of 0.1 s."""
+    content = positions_table(climbing, nothing)
+    header, *_ = content.decode().splitlines()
+    assert header == "window,seconds,robot,x_m,y_m,vx_mps,vy_mps,is_on,z_m,vz_mps"
+    rows = rows_of(content)
+    start_m = [float(row["z_m"]) for row in rows[:12]]
+    assert max(start_m) > 30.0
+    for row in rows:
+        k, robot = int(row["window"]) - 1, int(row["robot"])
+        assert float(row["z_m"]) == pytest.approx(start_m[robot] + 0.2 * k, abs=1e-5)
+        if k == 0:
+            assert row["vz_mps"] == ""
+        else:
+            assert float(row["vz_mps"]) == pytest.approx(2.0, abs=1e-6)
+
+
 def test_robots_that_failed_are_off(failing, tmp_path, nothing):
     write_replay(failing.log, {"seed": 5}, tmp_path / "a.rrd")
     rows = rows_of(positions_table(read_flown(tmp_path / "a.rrd"), nothing))

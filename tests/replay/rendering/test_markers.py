@@ -11,9 +11,12 @@ from swarm_mj.replay import palette
 from swarm_mj.replay.footage import Ground
 from swarm_mj.replay.links import LINK, SEGMENTS, LinkMismatch
 from swarm_mj.replay.rendering.markers import (
+    CHASE_FOV_Y_DEG,
+    CHASE_POINT_M,
     FOV_Y_DEG,
     TRAIL_PIECES,
     TRAIL_S,
+    chase,
     draw_markers,
     look_at,
 )
@@ -113,10 +116,91 @@ def test_the_camera_is_flat_in_wide_pictures_and_steep_in_high_ones(height, axis
 
 def test_the_target_is_in_the_middle_north_is_up_and_a_pixel_as_large_as_the_lens_says():
     camera = look_at(Ground(centre_m=np.zeros((1, 2)), reach_m=100.0), 0, 640, 480)
-    middle = np.append(camera.target_m, 0.0)
+    middle = camera.target_m
     at, east, north, above = camera.pixels(middle + np.vstack([np.zeros(3), np.eye(3)]))
     np.testing.assert_allclose(at, [320, 240])
     np.testing.assert_allclose(east, [320 + 1.0 / camera.pixel_m, 240])
     assert max(north[1], above[1]) < 240
     whole_m = 2.0 * camera.distance_m * np.tan(np.deg2rad(FOV_Y_DEG) / 2.0)
     np.testing.assert_allclose(camera.pixel_m * 480, whole_m)
+
+
+def flying(way_m, **facts):
+    """Robot 0 goes along a way, at a window a place, and robot 1 stands 40 m to the north."""
+    seen = moment([(0.0, 0.0), (0.0, 40.0)], num_windows=len(way_m), **facts)
+    seen.position_m[:, 0] = way_m
+    return seen
+
+
+def east(num_windows=100):
+    """10 m a second to the east."""
+    along_m = np.arange(num_windows, dtype=float)
+    return np.stack([along_m, np.zeros(num_windows)], axis=1)
+
+
+def test_the_chasing_camera_is_behind_and_above_its_robot_and_looks_where_it_flies():
+    camera = chase(flying(east()), 50, 640, 480)
+    assert camera.azimuth_deg == pytest.approx(0.0, abs=0.1)
+    elevation = np.deg2rad(camera.elevation_deg)
+    behind_m = CHASE_POINT_M * np.array([np.cos(elevation), 0.0, -np.sin(elevation)])
+    eye_m = camera.target_m - behind_m
+    np.testing.assert_allclose(camera.target_m[:2], [50.0, 0.0])
+    assert eye_m[0] == pytest.approx(50.0 - CHASE_POINT_M, abs=0.2)
+    assert eye_m[2] > 2.0  # a point's middle is at 1 m
+    robot, left, ahead, above = camera.pixels(
+        np.array([[50.0, 0.0, 1.0], [50.0, 5.0, 1.0], [90.0, 0.0, 1.0], [50.0, 0.0, 3.0]])
+    )
+    assert robot[0] == pytest.approx(320.0, abs=0.5)
+    assert 240.0 < robot[1] < 0.75 * 480.0
+    assert left[0] < robot[0] - 50.0
+    assert ahead[1] < robot[1] - 20.0
+    assert above[1] < robot[1] - 50.0
+
+
+def test_pixels_of_the_chasing_camera_are_as_the_lens_says():
+    """At the distance of its target, the picture is twice the tangent of half the angle high."""
+    camera = chase(flying(east()), 50, 640, 480)
+    up_m = np.array([0.0, 0.0, 1.0])
+    _, up, _ = camera.axes(up_m[None])
+    (place,) = camera.pixels((camera.target_m + 0.01 * up_m)[None])
+    whole_m = 2.0 * CHASE_POINT_M * np.tan(np.deg2rad(CHASE_FOV_Y_DEG / 2.0))
+    assert 240.0 - place[1] == pytest.approx(480.0 * 0.01 * up[0] / whole_m, rel=0.01)
+
+
+def test_a_robot_that_turns_at_once_lets_the_camera_swing_round():
+    """By less than 10 degrees a window, over some seconds."""
+    way_m = east()
+    way_m[50:, 0] = way_m[50, 0]
+    way_m[50:, 1] = np.arange(50.0)
+    seen = flying(way_m)
+    azimuth_deg = np.array([chase(seen, k, 640, 480).azimuth_deg for k in range(100)])
+    assert azimuth_deg[10] == pytest.approx(0.0, abs=0.5)
+    assert azimuth_deg[90] == pytest.approx(90.0, abs=0.5)
+    assert np.all(np.diff(azimuth_deg) > -0.5)
+    assert np.max(np.diff(azimuth_deg)) < 10.0
+
+
+def test_the_camera_of_a_robot_at_rest_looks_at_its_team():
+    """To the north, where the other one is; and so does that of robots at one place."""
+    still = np.zeros((5, 2))
+    assert chase(flying(still), 2, 640, 480).azimuth_deg == pytest.approx(90.0)
+    together = moment([(0.0, 0.0), (0.0, 0.0)])
+    assert chase(together, 0, 640, 480).azimuth_deg == pytest.approx(90.0)
+
+
+def test_from_nearby_others_are_balls_as_large_on_the_picture_wherever_they_are():
+    """The followed robot has none; each has a stem, down to the floor."""
+    seen = moment([(0.0, 0.0), (0.0, 80.0), (0.0, 160.0)])
+    camera = chase(seen, 0, 640, 480)
+    scene = mujoco.MjvScene(mujoco.MjModel.from_xml_string("<mujoco/>"), 100)
+    scene.ngeom = 0
+    draw_markers(scene, seen, 0, camera)
+    geoms = [scene.geoms[k] for k in range(scene.ngeom)]
+    balls = [geom for geom in geoms if geom.type == mujoco.mjtGeom.mjGEOM_SPHERE]
+    stems = [geom for geom in geoms if geom.type == mujoco.mjtGeom.mjGEOM_LINE]
+    np.testing.assert_allclose([ball.pos for ball in balls], [(0, 80, 1), (0, 160, 1)], atol=1e-5)
+    np.testing.assert_allclose([end(stem)[2] for stem in stems], [0.0] * 3, atol=1e-5)
+    _, _, ahead_m = camera.axes(np.array([ball.pos for ball in balls]) - camera.target_m)
+    far_m = camera.distance_m + ahead_m
+    shares = [ball.size[0] / far for ball, far in zip(balls, far_m, strict=True)]
+    assert shares[0] == pytest.approx(shares[1], rel=1e-4)

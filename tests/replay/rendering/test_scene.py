@@ -92,6 +92,22 @@ def test_what_a_scene_of_one_s_own_adds_is_drawn():
         assert renderer.frame(seen)[:20].std(axis=(0, 1)).max() == 0.0
 
 
+def test_the_chasing_camera_sees_its_robot_and_the_others_where_it_says():
+    """The observer is in the middle, and a green robot 30 m ahead is above it."""
+    mission = paper("stationary", num_robots=2)
+    seen = moment([(0.0, 0.0), (0.0, 30.0)], reach_m=mission.half_side_m)
+    with SceneRenderer(mission, *SIZE, camera="chase") as renderer:
+        picture, camera = renderer.frame(seen), renderer.camera(seen)
+    (observer, other) = camera.pixels(seen.place_m(0))
+    is_ball = ndimage.binary_opening(is_of(picture, GREEN))  # without the stem, which is thin
+    y, x = ndimage.center_of_mass(is_ball)
+    np.testing.assert_allclose((x, y), other, atol=3.0)
+    blobs, _ = ndimage.label(picture.min(axis=2) > 90)
+    x, y = observer.round().astype(int)
+    assert blobs[y, x] > 0
+    assert np.sum(blobs == blobs[y, x]) > 300  # a ball of a metre, 8 m away
+
+
 def test_two_renderers_do_not_disturb_each_other():
     mission = paper("stationary", num_robots=3)
     seen = moment([(0.0, 0.0), (100.0, 0.0), (0.0, 100.0)], reach_m=mission.half_side_m)

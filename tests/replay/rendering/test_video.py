@@ -97,6 +97,14 @@ def test_links_that_surprise_and_their_shortfalls_are_seen(blocked):
     assert unseen == 0
 
 
+@with_opengl
+def test_from_nearby_robots_move_between_windows_too(high):
+    with Movie([high.log], replace(STYLE, camera="chase")) as movie:
+        pictures = [movie.picture([5.0 + k / 3.0]) for k in range(4)]
+    for one, next_one in itertools.pairwise(pictures):
+        assert np.any(one[70:250] != next_one[70:250])
+
+
 PLAIN = VideoStyle(width=320, height=240, seconds=1.0, fps=10)
 COLOURS = [palette.LOST, palette.DELIVERED, palette.BROADCAST, palette.EGO]
 
