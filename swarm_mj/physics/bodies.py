@@ -3,7 +3,7 @@
 The paper's equation gives no body its velocity, but the set point of its pilot: the acceleration,
 clipped to A_max, moves the set point, clipped to V_max per axis. At the edge of the area
 the set point is mirrored, so bodies turn there as well as they can. A body that flies and touches
-anything has crashed: its rotors stop, and so does its radio.
+anything has crashed: its rotors idle, and its radio is off.
 """
 
 from collections.abc import Sequence

@@ -2,9 +2,11 @@
 
 import numpy as np
 import pytest
+from mujoco import MjData, mj_forward, mj_step, mjtEnableBit
 
 from swarm_mj import make_policy, paper
 from swarm_mj.physics.bodies import BodyWorlds
+from swarm_mj.physics.scene import compose
 from swarm_mj.policies.registry import POLICIES
 from swarm_mj.protocol.packets import packet_of
 from swarm_mj.simulation.swarm import Swarm
@@ -70,6 +72,90 @@ def test_its_terminal_speed_is_that_of_its_drag(box):
     swarm = flown(mission, [1], 130, pilot=Resting())
     terminal_mps = np.sqrt(2.0 * 1.0 * 9.81 / (1.204 * 0.4 * 0.4))
     np.testing.assert_allclose(swarm.states.velocity_mps[0, :, 2], -terminal_mps, rtol=0.15)
+
+
+BALL = """
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <body name="base">
+      <freejoint/><site name="s"/>
+      <geom type="sphere" size="0.1" mass="10" priority="1" condim="1"
+        solref="-10000 -{damping}" solimp="0.9999 0.9999 0.001 0.5 2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.1, 0.2, 0.4])
+def test_a_file_s_contact_parameters_say_how_high_it_bounces(tmp_path, damping_ratio):
+    """A spring and a damper that push only: Schwager and Poschel, Granular Matter 9 (2007)."""
+    stiffness = 10_000.0  # of `BALL`, over the mass [1/s²]
+    decay = damping_ratio * np.sqrt(stiffness)
+    turn = np.sqrt(stiffness - decay**2)
+    contact = np.pi - np.arctan2(2.0 * decay * turn, turn**2 - decay**2)
+    restitution = np.exp(-decay / turn * contact)
+    path = tmp_path / "ball.xml"
+    path.write_text(BALL.format(damping=2.0 * decay))
+    mission = paper("stationary", robot=str(path), num_robots=2, height_m=2.0)
+    swarm = flown(mission, [1], 8, pilot=Resting())  # 0.62 s to the floor, then upwards
+    velocity_mps = swarm.states.velocity_mps[0, :, 2]
+    risen_m = swarm.states.position_m[0, :, 2] - 0.1
+    assert np.all(velocity_mps > 0.0)
+    kept = (velocity_mps**2 / 2.0 + 9.81 * risen_m) / (9.81 * (2.0 - 0.1))
+    np.testing.assert_allclose(kept, restitution**2, atol=0.015)
+
+
+def test_a_quadrotor_that_fell_lies_on_the_floor_which_carries_its_weight():
+    """Its hull is 0.1 m high; MuJoCo's usual contacts, which `quadrotor.xml` has, do not bounce.
+
+    Its four rotors still lift the least that they can.
+    """
+    mission = paper("stationary", robot="quadrotor", num_robots=2, height_m=2.0)
+    worlds = BodyWorlds(mission, 1, pilot=Resting())
+    worlds.start([np.random.default_rng(0)])
+    position_m = np.array([[[0.0, 0.0, 2.0], [50.0, 0.0, 2.0]]])
+    worlds.place(position_m, np.zeros_like(position_m))
+    for _ in range(40):
+        states = worlds.step(np.zeros_like(position_m))
+    np.testing.assert_allclose(states.position_m[0, :, 2], 0.05, atol=0.003)
+    np.testing.assert_allclose(states.velocity_mps, 0.0, atol=1e-3)
+    np.testing.assert_allclose(worlds._flown[0].push[0, :, 2], 0.5 * 9.81 - 4 * 0.088, rtol=0.001)
+
+
+def energy_drift_j(step_s, turn_rate_rps):
+    """Energy that one of two quadrotors in a vacuum wins as it falls and turns for 0.5 s."""
+    model = compose(paper("stationary", robot="quadrotor", num_robots=2)).compile()
+    model.opt.density = 0.0
+    model.opt.viscosity = 0.0
+    model.opt.timestep = step_s
+    model.opt.enableflags |= int(mjtEnableBit.mjENBL_ENERGY)
+    model.actuator_ctrllimited[:] = False  # no rotor turns, not even at its least
+    data = MjData(model)
+    for i in range(2):
+        data.qpos[7 * i : 7 * i + 4] = (50.0 * i, 0.0, 20.0, 1.0)
+        data.qvel[6 * i + 3 : 6 * i + 6] = turn_rate_rps
+    mj_forward(model, data)
+    before_j = data.energy.sum()
+    for _ in range(round(0.5 / step_s)):
+        mj_step(model, data)
+    mj_forward(model, data)
+    return (data.energy.sum() - before_j) / 2.0
+
+
+@pytest.mark.parametrize("step_s", [0.01, 0.005, 0.0025])
+def test_energy_drifts_in_proportion_to_euler_s_step(step_s):
+    """In free fall by m g² h t / 2 exactly; what turns, too, drifts half as much at half a step."""
+    fall_j = energy_drift_j(step_s, (0.0, 0.0, 0.0))
+    assert fall_j == pytest.approx(-0.5 * 9.81**2 * step_s * 0.5 / 2.0, rel=1e-9)
+    turning_rps = (3.0, 4.0, 5.0)
+    whole_j = energy_drift_j(step_s, turning_rps) - fall_j
+    half_step_j = energy_drift_j(step_s / 2.0, turning_rps) - fall_j / 2.0
+    assert whole_j == pytest.approx(2.0 * half_step_j, rel=0.03)
+    kinetic_j = 0.5 * np.dot([2.32e-3, 2.32e-3, 4e-3], np.square(turning_rps))
+    assert abs(whole_j) < 0.03 * kinetic_j
 
 
 def test_what_lifts_its_weight_hovers_and_what_falls_on_the_floor_has_crashed(box):
