@@ -329,6 +329,80 @@ def test_walking_robots_turn_at_the_edge():
     assert farthest_m < mission.half_side_m + 10.0
 
 
+def pair_at_rest(robot, **fields):
+    """A world of two robots, which start at rest 100 m apart."""
+    worlds = BodyWorlds(paper("random-walk", robot=robot, num_robots=2, **fields), 1)
+    worlds.start([np.random.default_rng(0)])
+    position_m = np.zeros((1, 2, 3))
+    position_m[0, :, 0] = (-50.0, 50.0)
+    position_m[..., 2] = worlds.draw_heights_m(np.random.default_rng(0))
+    worlds.place(position_m, np.zeros_like(position_m))
+    return worlds, position_m
+
+
+def stepped(worlds, num_windows):
+    """The states after some windows in which nothing accelerates."""
+    still = np.zeros_like(worlds.states.position_m)
+    for _ in range(num_windows):
+        states = worlds.step(still)
+    return states
+
+
+def test_a_quadrotor_at_rest_in_a_wind_stays_near_its_place():
+    """Downwind by its drift in m/s over 0.6 per second, which is what it flies back with."""
+    worlds, start_m = pair_at_rest("quadrotor", wind_mps=8.0)
+    settled_m = stepped(worlds, 150).position_m
+    states = stepped(worlds, 10)
+    np.testing.assert_allclose(states.position_m, settled_m, atol=0.01)
+    off_m = states.position_m - start_m
+    side_m, flat_m = 0.219, 0.088  # of the box of its inertia
+    drag_mps2 = 0.5 * 1.204 * side_m * flat_m * 8.0**2 / 0.5
+    np.testing.assert_allclose(off_m[..., 0], drag_mps2 / 2.5 / 0.6, rtol=0.35)
+    np.testing.assert_allclose(off_m[..., 1], 0.0, atol=0.01)
+
+
+def test_a_strong_wind_does_not_blow_a_rover_off():
+    """It drifted by 10 m in half a minute."""
+    worlds, start_m = pair_at_rest("rover", wind_mps=20.0)
+    states = stepped(worlds, 300)
+    np.testing.assert_allclose(states.position_m, start_m, atol=0.7)
+
+
+@pytest.mark.parametrize("robot", ["quadrotor", "rover"])
+def test_a_robot_returns_to_where_its_set_point_came_to_rest(robot):
+    worlds, start_m = pair_at_rest(robot)
+    acceleration = np.zeros_like(start_m)
+    acceleration[0, :, 0] = 10.0
+    worlds.step(acceleration)  # 1 m/s
+    before_m = stepped(worlds, 29).position_m.copy()
+    worlds.step(-acceleration)
+    overshot_m = stepped(worlds, 4).position_m.copy()
+    states = stepped(worlds, 100)
+    np.testing.assert_allclose(states.position_m[..., 0], before_m[..., 0] + 0.1, atol=0.12)
+    assert np.all(overshot_m[..., 0] > states.position_m[..., 0] + 0.02)
+    np.testing.assert_allclose(states.position_m[..., 1:], start_m[..., 1:], atol=0.01)
+
+
+def test_pilots_of_robots_that_move_get_the_set_points_as_they_are():
+    """Each is the last one plus u dt, as of points; nothing pulls them back."""
+    worlds, start_m = pair_at_rest("quadrotor", wind_mps=10.0)
+    rng = np.random.default_rng(5)
+    due_mps = np.zeros_like(start_m)
+    for _ in range(20):
+        acceleration = rng.uniform(-2.0, 2.0, start_m.shape)
+        due_mps += acceleration * 0.1
+        worlds.step(acceleration)
+        np.testing.assert_allclose(worlds._flown[0].wanted.velocity_mps, due_mps, atol=1e-12)
+
+
+def test_a_set_point_never_flies_back_faster_than_robots_may():
+    """50 m off its place, at V_max = 3 m/s per axis."""
+    worlds, _ = pair_at_rest("quadrotor")
+    worlds._place_m += 50.0
+    stepped(worlds, 1)
+    np.testing.assert_allclose(worlds._flown[0].wanted.velocity_mps[..., :2], 3.0)
+
+
 def test_a_mission_is_the_same_in_any_batch_and_on_any_number_of_threads():
     mission = paper("random-walk", robot="quadrotor", num_robots=8, range_ratio=0.6, gust_mps=2.0)
     alone = flown(mission, [7], 20)
