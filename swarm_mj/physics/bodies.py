@@ -42,7 +42,9 @@ from swarm_mj.system.user_code import is_ours
 
 LAGS = [int(mjtDyn.mjDYN_FILTER), int(mjtDyn.mjDYN_FILTEREXACT)]  # a control, a while later
 VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robot
-FARTHEST_M = 1e6  # no robot of a stable model gets so far
+FARTHEST = 1e6  # no robot of a stable model gets so far [m], or so fast [m/s and rad/s]
+# Of what has crashed [rad/s]: in a storm it tumbles, and Euler's steps would spin it up for ever.
+MOST_TUMBLING_RPS = 100.0
 RETURN_PER_S = 0.6  # speed towards a place over the way to it: a pilot's velocities settle faster
 
 
@@ -315,8 +317,10 @@ class BodyWorlds:
             self._steer()
             self._batch.step()
             for flown in self._flown:
+                _check_stable(flown)  # before the next step: MuJoCo dies of what is no number
                 if flown.kind.is_free:
                     _note_contacts(flown.push, flown.has_crashed)
+                    _slow_tumbling(flown.has_crashed, flown.qvel)
         self._change_gusts()
         self._take_states()
         self._count_active()
@@ -344,19 +348,22 @@ class BodyWorlds:
             position_m[:, flown.robots] = sensed.position_m
             velocity_mps[:, flown.robots] = sensed.velocity_mps
             attitude[:, flown.robots] = sensed.attitude
-        is_somewhere = np.abs(position_m) < FARTHEST_M  # which nothing is that is no number
-        if not np.all(is_somewhere):
-            b, i, _ = np.argwhere(~is_somewhere)[0]
-            raise ValueError(
-                f"robot {i} of mission {b} is nowhere: its model is not stable under its pilot; "
-                "choose lower gains, or a shorter timestep in its file"
-            )
         self.states = replace(
             states,
             position_m=position_m,
             velocity_mps=velocity_mps,
             attitude=attitude,
             has_crashed=self._has_crashed.copy(),
+        )
+
+
+def _check_stable(flown: _Flown) -> None:
+    """Raise ValueError if a robot of this kind is nowhere."""
+    b, i = _lost_robot(flown.qpos, flown.qvel)
+    if b >= 0:
+        raise ValueError(
+            f"robot {flown.kind.first + i} of mission {b} is nowhere: its model is not stable "
+            "under its pilot; choose lower gains, or a shorter timestep in its file"
         )
 
 
@@ -487,6 +494,32 @@ def _note_contacts(push: Float[np.ndarray, "B n V"], has_crashed: Bool[np.ndarra
         for i in range(push.shape[1]):
             if push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0 or push[b, i, 2] != 0.0:
                 has_crashed[b, i] = True
+
+
+@compiled(makes_arrays=False)
+def _slow_tumbling(has_crashed: Bool[np.ndarray, "B n"], qvel: Float[np.ndarray, "B n V"]) -> None:
+    for b in range(qvel.shape[0]):
+        for i in range(qvel.shape[1]):
+            if has_crashed[b, i]:
+                for axis in range(3, FREE_QVEL):
+                    rate = qvel[b, i, axis]
+                    qvel[b, i, axis] = min(max(rate, -MOST_TUMBLING_RPS), MOST_TUMBLING_RPS)
+
+
+@compiled(makes_arrays=False)
+def _lost_robot(
+    qpos: Float[np.ndarray, "B n Q"], qvel: Float[np.ndarray, "B n V"]
+) -> tuple[int, int]:
+    """Return the mission and number of a robot that is too far or too fast, or -1 twice."""
+    for b in range(qpos.shape[0]):
+        for i in range(qpos.shape[1]):
+            for number in qpos[b, i]:
+                if not abs(number) < FARTHEST:  # nor is what is no number
+                    return b, i
+            for number in qvel[b, i]:
+                if not abs(number) < FARTHEST:
+                    return b, i
+    return -1, -1
 
 
 @compiled(makes_arrays=False)

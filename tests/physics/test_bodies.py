@@ -231,6 +231,35 @@ def test_a_pilot_whose_robots_fly_apart_is_named(box):
         flown(mission, [1], 2, pilot=Violent())
 
 
+@pytest.mark.parametrize("number", [2e6, -1e9])
+def test_a_robot_that_is_lost_is_named_before_mujoco_steps_on(box, number):
+    """MuJoCo crashed the process some steps after it had lost a robot in a storm."""
+    worlds, start_m = pair_at_rest(box, pilot=Resting())
+    worlds._flown[0].qvel[0, 1, 4] = number
+    with pytest.raises(ValueError, match="robot 1 of mission 0 is nowhere: its model is not"):
+        worlds.step(np.zeros_like(start_m))
+
+
+def test_what_has_crashed_tumbles_at_most_so_fast_that_euler_s_steps_bear_it():
+    """A turn of 100 rad/s is half a radian a step; without the limit it grows without end."""
+    worlds, start_m = pair_at_rest("quadrotor", wind_mps=20.0)
+    worlds._has_crashed[0, 0] = True
+    worlds._flown[0].qvel[0, :, 3:6] = [[-300.0, 200.0, 80.0], [1.0, 1.0, 1.0]]
+    worlds.step(np.zeros_like(start_m))
+    rates_rps = np.abs(worlds._flown[0].qvel[0, :, 3:6])
+    assert 50.0 < rates_rps[0].max() <= 100.0
+    assert rates_rps[1].max() < 2.0
+
+
+@pytest.mark.slow
+def test_a_storm_ends_no_mission():
+    """Winds of 30 m/s and gusts tear robots down, and the mission goes on to its end."""
+    mission = paper("flocking", robot="quadrotor", wind_mps=30.0, gust_mps=12.0)
+    swarm = flown(mission, [1, 2], 500, policy="round-robin")
+    assert swarm.states.has_crashed.any()
+    assert np.all(np.isfinite(swarm.states.position_m))
+
+
 def test_a_pilot_that_writes_no_numbers_is_named(box):
     class Lost:
         def __call__(self, _sensed, _wanted, control):
@@ -329,9 +358,10 @@ def test_walking_robots_turn_at_the_edge():
     assert farthest_m < mission.half_side_m + 10.0
 
 
-def pair_at_rest(robot, **fields):
+def pair_at_rest(robot, pilot=None, **fields):
     """A world of two robots, which start at rest 100 m apart."""
-    worlds = BodyWorlds(paper("random-walk", robot=robot, num_robots=2, **fields), 1)
+    mission = paper("random-walk", robot=robot, num_robots=2, **fields)
+    worlds = BodyWorlds(mission, 1, pilot=pilot)
     worlds.start([np.random.default_rng(0)])
     position_m = np.zeros((1, 2, 3))
     position_m[0, :, 0] = (-50.0, 50.0)
