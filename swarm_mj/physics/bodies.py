@@ -2,8 +2,9 @@
 
 The paper's equation gives no body its velocity, but the set point of its pilot: the acceleration,
 clipped to A_max, moves the set point, clipped to V_max per axis. At the edge of the area
-the set point is mirrored, so bodies turn there as well as they can. A body that flies and touches
-anything has crashed: its rotors stop, and so does its radio.
+the set point is mirrored, so bodies turn there as well as they can. While the set point is 0 in the
+plane, its body holds its place there. A body that flies and touches anything has crashed: its
+rotors idle, and its radio is off.
 """
 
 from collections.abc import Sequence
@@ -20,6 +21,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started, Stream, normal
 from swarm_mj.mission.bodies import LEAST_HEIGHT_M
 from swarm_mj.mission.faults import MIN_SURVIVORS
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.energy import Motors, motors_of, use_energy
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
@@ -42,7 +44,10 @@ from swarm_mj.system.user_code import is_ours
 
 LAGS = [int(mjtDyn.mjDYN_FILTER), int(mjtDyn.mjDYN_FILTEREXACT)]  # a control, a while later
 VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robot
-FARTHEST_M = 1e6  # no robot of a stable model gets so far
+FARTHEST = 1e6  # no robot of a stable model gets so far [m], or so fast [m/s and rad/s]
+# Of what has crashed [rad/s]: in a storm it tumbles, and Euler's steps would spin it up for ever.
+MOST_TUMBLING_RPS = 100.0
+RETURN_PER_S = 0.6  # speed towards a place over the way to it: a pilot's velocities settle faster
 
 
 class _Flown(NamedTuple):
@@ -112,7 +117,9 @@ class BodyWorlds:
         self._step_s = mission.window_s / self._num_steps
         pilots = make_pilots(kinds, self._step_s, pilot)
         shape = (num_missions, mission.num_robots)
-        self._wanted_mps = np.zeros((*shape, 3))
+        self._course_mps = np.zeros((*shape, 3))  # the set points of the paper's equation
+        self._wanted_mps = np.zeros((*shape, 3))  # those of pilots, who also hold places
+        self._place_m = np.zeros((*shape, PLANE))
         self._height_m = np.zeros(shape)
         self._has_crashed = np.zeros(shape, dtype=np.bool_)
         self._energy_j = np.zeros(shape)
@@ -244,7 +251,9 @@ class BodyWorlds:
     ) -> None:
         """Restart all worlds from p_0 [m] and v_0 [m/s], level, with rotors at their set points."""
         self._batch.reset()
+        self._course_mps[:] = velocity_mps
         self._wanted_mps[:] = velocity_mps
+        self._place_m[:] = position_m[..., :PLANE]
         self._height_m[:] = position_m[..., 2]
         self._has_crashed[:] = False
         self._works = None
@@ -311,19 +320,29 @@ class BodyWorlds:
             limit_mps2=mission.max_acceleration_mps2,
             limit_mps=mission.max_velocity_mps,
             wall_m=mission.half_side_m if mission.has_walls else np.inf,
-            wanted_mps=self._wanted_mps,
+            course_mps=self._course_mps,
             height_m=self._height_m,
+        )
+        _hold_places(
+            position=self.states.position_m,
+            course_mps=self._course_mps,
+            dt_s=mission.window_s,
+            limit_mps=mission.max_velocity_mps,
+            place_m=self._place_m,
+            wanted_mps=self._wanted_mps,
         )
         for _ in range(self._num_steps):
             self._steer()
             self._batch.step()
             for flown in self._flown:
+                _check_stable(flown)  # before the next step: MuJoCo dies of what is no number
                 if flown.motors is not None:
                     use_energy(
                         flown.motors, flown.force, flown.speed, flown.has_crashed, flown.energy_j
                     )
                 if flown.kind.is_free:
                     _note_contacts(flown.push, flown.has_crashed)
+                    _slow_tumbling(flown.has_crashed, flown.qvel)
         self._change_gusts()
         self._take_states()
         self._count_active()
@@ -356,13 +375,6 @@ class BodyWorlds:
             position_m[:, flown.robots] = sensed.position_m
             velocity_mps[:, flown.robots] = sensed.velocity_mps
             attitude[:, flown.robots] = sensed.attitude
-        is_somewhere = np.abs(position_m) < FARTHEST_M  # which nothing is that is no number
-        if not np.all(is_somewhere):
-            b, i, _ = np.argwhere(~is_somewhere)[0]
-            raise ValueError(
-                f"robot {i} of mission {b} is nowhere: its model is not stable under its pilot; "
-                "choose lower gains, or a shorter timestep in its file"
-            )
         self.states = replace(
             states,
             position_m=position_m,
@@ -371,6 +383,16 @@ class BodyWorlds:
             has_crashed=self._has_crashed.copy(),
             sensors=sensors,
             energy_j=self._energy_j.copy(),
+        )
+
+
+def _check_stable(flown: _Flown) -> None:
+    """Raise ValueError if a robot of this kind is nowhere."""
+    b, i = _lost_robot(flown.qpos, flown.qvel)
+    if b >= 0:
+        raise ValueError(
+            f"robot {flown.kind.first + i} of mission {b} is nowhere: its model is not stable "
+            "under its pilot; choose lower gains, or a shorter timestep in its file"
         )
 
 
@@ -447,7 +469,7 @@ def _move_set_points(
     limit_mps2: float,
     limit_mps: float,
     wall_m: float,
-    wanted_mps: Float[np.ndarray, "B N 3"],
+    course_mps: Float[np.ndarray, "B N 3"],
     height_m: Float[np.ndarray, "B N"],
 ) -> None:
     """Accelerate, clip, and turn round at the edge; heights follow what climbs."""
@@ -455,15 +477,43 @@ def _move_set_points(
         for i in range(acceleration.shape[1]):
             for axis in range(3):
                 u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
-                v = min(max(wanted_mps[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
+                v = min(max(course_mps[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
                 p = position[b, i, axis]
                 if axis < 2 and abs(p) > wall_m and p * v > 0.0:
                     v = -v
-                wanted_mps[b, i, axis] = v
-            height_m[b, i] += wanted_mps[b, i, 2] * dt_s
+                course_mps[b, i, axis] = v
+            height_m[b, i] += course_mps[b, i, 2] * dt_s
             if height_m[b, i] < LEAST_HEIGHT_M:  # it may not sink further
                 height_m[b, i] = LEAST_HEIGHT_M
-                wanted_mps[b, i, 2] = max(wanted_mps[b, i, 2], 0.0)
+                course_mps[b, i, 2] = max(course_mps[b, i, 2], 0.0)
+
+
+@compiled(makes_arrays=False)
+def _hold_places(
+    position: Float[np.ndarray, "B N 3"],
+    course_mps: Float[np.ndarray, "B N 3"],
+    dt_s: float,
+    limit_mps: float,
+    place_m: Float[np.ndarray, "B N 2"],
+    wanted_mps: Float[np.ndarray, "B N 3"],
+) -> None:
+    """Let pilots follow the set points, and fly back to where bodies were when these came to rest.
+
+    The place of a body that moves is where it will be in a window, when its set point may rest.
+    """
+    for b in range(position.shape[0]):
+        for i in range(position.shape[1]):
+            rests = course_mps[b, i, 0] == 0.0 and course_mps[b, i, 1] == 0.0
+            for axis in range(2):
+                v = course_mps[b, i, axis]
+                p = position[b, i, axis]
+                if rests:
+                    back = RETURN_PER_S * (place_m[b, i, axis] - p)
+                    v = min(max(back, -limit_mps), limit_mps)
+                else:
+                    place_m[b, i, axis] = p + v * dt_s
+                wanted_mps[b, i, axis] = v
+            wanted_mps[b, i, 2] = course_mps[b, i, 2]
 
 
 @compiled(makes_arrays=False)
@@ -473,6 +523,32 @@ def _note_contacts(push: Float[np.ndarray, "B n V"], has_crashed: Bool[np.ndarra
         for i in range(push.shape[1]):
             if push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0 or push[b, i, 2] != 0.0:
                 has_crashed[b, i] = True
+
+
+@compiled(makes_arrays=False)
+def _slow_tumbling(has_crashed: Bool[np.ndarray, "B n"], qvel: Float[np.ndarray, "B n V"]) -> None:
+    for b in range(qvel.shape[0]):
+        for i in range(qvel.shape[1]):
+            if has_crashed[b, i]:
+                for axis in range(3, FREE_QVEL):
+                    rate = qvel[b, i, axis]
+                    qvel[b, i, axis] = min(max(rate, -MOST_TUMBLING_RPS), MOST_TUMBLING_RPS)
+
+
+@compiled(makes_arrays=False)
+def _lost_robot(
+    qpos: Float[np.ndarray, "B n Q"], qvel: Float[np.ndarray, "B n V"]
+) -> tuple[int, int]:
+    """Return the mission and number of a robot that is too far or too fast, or -1 twice."""
+    for b in range(qpos.shape[0]):
+        for i in range(qpos.shape[1]):
+            for number in qpos[b, i]:
+                if not abs(number) < FARTHEST:  # nor is what is no number
+                    return b, i
+            for number in qvel[b, i]:
+                if not abs(number) < FARTHEST:
+                    return b, i
+    return -1, -1
 
 
 @compiled(makes_arrays=False)

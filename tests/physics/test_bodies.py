@@ -2,10 +2,12 @@
 
 import numpy as np
 import pytest
+from mujoco import MjData, mj_forward, mj_step, mjtEnableBit
 from scanners import SCANNERS
 
 from swarm_mj import make_policy, paper
 from swarm_mj.physics.bodies import BodyWorlds
+from swarm_mj.physics.scene import compose
 from swarm_mj.policies.registry import POLICIES
 from swarm_mj.protocol.packets import packet_of
 from swarm_mj.simulation.swarm import Swarm
@@ -71,6 +73,90 @@ def test_its_terminal_speed_is_that_of_its_drag(box):
     swarm = flown(mission, [1], 130, pilot=Resting())
     terminal_mps = np.sqrt(2.0 * 1.0 * 9.81 / (1.204 * 0.4 * 0.4))
     np.testing.assert_allclose(swarm.states.velocity_mps[0, :, 2], -terminal_mps, rtol=0.15)
+
+
+BALL = """
+<mujoco>
+  <option timestep="0.001"/>
+  <worldbody>
+    <body name="base">
+      <freejoint/><site name="s"/>
+      <geom type="sphere" size="0.1" mass="10" priority="1" condim="1"
+        solref="-10000 -{damping}" solimp="0.9999 0.9999 0.001 0.5 2"/>
+    </body>
+  </worldbody>
+  <actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>
+</mujoco>
+"""
+
+
+@pytest.mark.parametrize("damping_ratio", [0.0, 0.1, 0.2, 0.4])
+def test_a_file_s_contact_parameters_say_how_high_it_bounces(tmp_path, damping_ratio):
+    """A spring and a damper that push only: Schwager and Poschel, Granular Matter 9 (2007)."""
+    stiffness = 10_000.0  # of `BALL`, over the mass [1/s²]
+    decay = damping_ratio * np.sqrt(stiffness)
+    turn = np.sqrt(stiffness - decay**2)
+    contact = np.pi - np.arctan2(2.0 * decay * turn, turn**2 - decay**2)
+    restitution = np.exp(-decay / turn * contact)
+    path = tmp_path / "ball.xml"
+    path.write_text(BALL.format(damping=2.0 * decay))
+    mission = paper("stationary", robot=str(path), num_robots=2, height_m=2.0)
+    swarm = flown(mission, [1], 8, pilot=Resting())  # 0.62 s to the floor, then upwards
+    velocity_mps = swarm.states.velocity_mps[0, :, 2]
+    risen_m = swarm.states.position_m[0, :, 2] - 0.1
+    assert np.all(velocity_mps > 0.0)
+    kept = (velocity_mps**2 / 2.0 + 9.81 * risen_m) / (9.81 * (2.0 - 0.1))
+    np.testing.assert_allclose(kept, restitution**2, atol=0.015)
+
+
+def test_a_quadrotor_that_fell_lies_on_the_floor_which_carries_its_weight():
+    """Its hull is 0.1 m high; MuJoCo's usual contacts, which `quadrotor.xml` has, do not bounce.
+
+    Its four rotors still lift the least that they can.
+    """
+    mission = paper("stationary", robot="quadrotor", num_robots=2, height_m=2.0)
+    worlds = BodyWorlds(mission, 1, pilot=Resting())
+    worlds.start([np.random.default_rng(0)])
+    position_m = np.array([[[0.0, 0.0, 2.0], [50.0, 0.0, 2.0]]])
+    worlds.place(position_m, np.zeros_like(position_m))
+    for _ in range(40):
+        states = worlds.step(np.zeros_like(position_m))
+    np.testing.assert_allclose(states.position_m[0, :, 2], 0.05, atol=0.003)
+    np.testing.assert_allclose(states.velocity_mps, 0.0, atol=1e-3)
+    np.testing.assert_allclose(worlds._flown[0].push[0, :, 2], 0.5 * 9.81 - 4 * 0.088, rtol=0.001)
+
+
+def energy_drift_j(step_s, turn_rate_rps):
+    """Energy that one of two quadrotors in a vacuum wins as it falls and turns for 0.5 s."""
+    model = compose(paper("stationary", robot="quadrotor", num_robots=2)).compile()
+    model.opt.density = 0.0
+    model.opt.viscosity = 0.0
+    model.opt.timestep = step_s
+    model.opt.enableflags |= int(mjtEnableBit.mjENBL_ENERGY)
+    model.actuator_ctrllimited[:] = False  # no rotor turns, not even at its least
+    data = MjData(model)
+    for i in range(2):
+        data.qpos[7 * i : 7 * i + 4] = (50.0 * i, 0.0, 20.0, 1.0)
+        data.qvel[6 * i + 3 : 6 * i + 6] = turn_rate_rps
+    mj_forward(model, data)
+    before_j = data.energy.sum()
+    for _ in range(round(0.5 / step_s)):
+        mj_step(model, data)
+    mj_forward(model, data)
+    return (data.energy.sum() - before_j) / 2.0
+
+
+@pytest.mark.parametrize("step_s", [0.01, 0.005, 0.0025])
+def test_energy_drifts_in_proportion_to_euler_s_step(step_s):
+    """In free fall by m g² h t / 2 exactly; what turns, too, drifts half as much at half a step."""
+    fall_j = energy_drift_j(step_s, (0.0, 0.0, 0.0))
+    assert fall_j == pytest.approx(-0.5 * 9.81**2 * step_s * 0.5 / 2.0, rel=1e-9)
+    turning_rps = (3.0, 4.0, 5.0)
+    whole_j = energy_drift_j(step_s, turning_rps) - fall_j
+    half_step_j = energy_drift_j(step_s / 2.0, turning_rps) - fall_j / 2.0
+    assert whole_j == pytest.approx(2.0 * half_step_j, rel=0.03)
+    kinetic_j = 0.5 * np.dot([2.32e-3, 2.32e-3, 4e-3], np.square(turning_rps))
+    assert abs(whole_j) < 0.03 * kinetic_j
 
 
 def test_what_lifts_its_weight_hovers_and_what_falls_on_the_floor_has_crashed(box):
@@ -144,6 +230,35 @@ def test_a_pilot_whose_robots_fly_apart_is_named(box):
     mission = paper("stationary", robot=box, num_robots=2)
     with pytest.raises(ValueError, match="not stable under its pilot"):
         flown(mission, [1], 2, pilot=Violent())
+
+
+@pytest.mark.parametrize("number", [2e6, -1e9])
+def test_a_robot_that_is_lost_is_named_before_mujoco_steps_on(box, number):
+    """MuJoCo crashed the process some steps after it had lost a robot in a storm."""
+    worlds, start_m = pair_at_rest(box, pilot=Resting())
+    worlds._flown[0].qvel[0, 1, 4] = number
+    with pytest.raises(ValueError, match="robot 1 of mission 0 is nowhere: its model is not"):
+        worlds.step(np.zeros_like(start_m))
+
+
+def test_what_has_crashed_tumbles_at_most_so_fast_that_euler_s_steps_bear_it():
+    """A turn of 100 rad/s is half a radian a step; without the limit it grows without end."""
+    worlds, start_m = pair_at_rest("quadrotor", wind_mps=20.0)
+    worlds._has_crashed[0, 0] = True
+    worlds._flown[0].qvel[0, :, 3:6] = [[-300.0, 200.0, 80.0], [1.0, 1.0, 1.0]]
+    worlds.step(np.zeros_like(start_m))
+    rates_rps = np.abs(worlds._flown[0].qvel[0, :, 3:6])
+    assert 50.0 < rates_rps[0].max() <= 100.0
+    assert rates_rps[1].max() < 2.0
+
+
+@pytest.mark.slow
+def test_a_storm_ends_no_mission():
+    """Winds of 30 m/s and gusts tear robots down, and the mission goes on to its end."""
+    mission = paper("flocking", robot="quadrotor", wind_mps=30.0, gust_mps=12.0)
+    swarm = flown(mission, [1, 2], 500, policy="round-robin")
+    assert swarm.states.has_crashed.any()
+    assert np.all(np.isfinite(swarm.states.position_m))
 
 
 def test_a_pilot_that_writes_no_numbers_is_named(box):
@@ -242,6 +357,81 @@ def test_walking_robots_turn_at_the_edge():
     swarm = flown(mission, [1], 200)
     farthest_m = np.max(np.abs(swarm.states.position_m[..., :2]))
     assert farthest_m < mission.half_side_m + 10.0
+
+
+def pair_at_rest(robot, pilot=None, **fields):
+    """A world of two robots, which start at rest 100 m apart."""
+    mission = paper("random-walk", robot=robot, num_robots=2, **fields)
+    worlds = BodyWorlds(mission, 1, pilot=pilot)
+    worlds.start([np.random.default_rng(0)])
+    position_m = np.zeros((1, 2, 3))
+    position_m[0, :, 0] = (-50.0, 50.0)
+    position_m[..., 2] = worlds.draw_heights_m(np.random.default_rng(0))
+    worlds.place(position_m, np.zeros_like(position_m))
+    return worlds, position_m
+
+
+def stepped(worlds, num_windows):
+    """The states after some windows in which nothing accelerates."""
+    still = np.zeros_like(worlds.states.position_m)
+    for _ in range(num_windows):
+        states = worlds.step(still)
+    return states
+
+
+def test_a_quadrotor_at_rest_in_a_wind_stays_near_its_place():
+    """Downwind by its drift in m/s over 0.6 per second, which is what it flies back with."""
+    worlds, start_m = pair_at_rest("quadrotor", wind_mps=8.0)
+    settled_m = stepped(worlds, 150).position_m
+    states = stepped(worlds, 10)
+    np.testing.assert_allclose(states.position_m, settled_m, atol=0.01)
+    off_m = states.position_m - start_m
+    side_m, flat_m = 0.219, 0.088  # of the box of its inertia
+    drag_mps2 = 0.5 * 1.204 * side_m * flat_m * 8.0**2 / 0.5
+    np.testing.assert_allclose(off_m[..., 0], drag_mps2 / 2.5 / 0.6, rtol=0.35)
+    np.testing.assert_allclose(off_m[..., 1], 0.0, atol=0.01)
+
+
+def test_a_strong_wind_does_not_blow_a_rover_off():
+    """It drifted by 10 m in half a minute."""
+    worlds, start_m = pair_at_rest("rover", wind_mps=20.0)
+    states = stepped(worlds, 300)
+    np.testing.assert_allclose(states.position_m, start_m, atol=0.7)
+
+
+@pytest.mark.parametrize("robot", ["quadrotor", "rover"])
+def test_a_robot_returns_to_where_its_set_point_came_to_rest(robot):
+    worlds, start_m = pair_at_rest(robot)
+    acceleration = np.zeros_like(start_m)
+    acceleration[0, :, 0] = 10.0
+    worlds.step(acceleration)  # 1 m/s
+    before_m = stepped(worlds, 29).position_m.copy()
+    worlds.step(-acceleration)
+    overshot_m = stepped(worlds, 4).position_m.copy()
+    states = stepped(worlds, 100)
+    np.testing.assert_allclose(states.position_m[..., 0], before_m[..., 0] + 0.1, atol=0.12)
+    assert np.all(overshot_m[..., 0] > states.position_m[..., 0] + 0.02)
+    np.testing.assert_allclose(states.position_m[..., 1:], start_m[..., 1:], atol=0.01)
+
+
+def test_pilots_of_robots_that_move_get_the_set_points_as_they_are():
+    """Each is the last one plus u dt, as of points; nothing pulls them back."""
+    worlds, start_m = pair_at_rest("quadrotor", wind_mps=10.0)
+    rng = np.random.default_rng(5)
+    due_mps = np.zeros_like(start_m)
+    for _ in range(20):
+        acceleration = rng.uniform(-2.0, 2.0, start_m.shape)
+        due_mps += acceleration * 0.1
+        worlds.step(acceleration)
+        np.testing.assert_allclose(worlds._flown[0].wanted.velocity_mps, due_mps, atol=1e-12)
+
+
+def test_a_set_point_never_flies_back_faster_than_robots_may():
+    """50 m off its place, at V_max = 3 m/s per axis."""
+    worlds, _ = pair_at_rest("quadrotor")
+    worlds._place_m += 50.0
+    stepped(worlds, 1)
+    np.testing.assert_allclose(worlds._flown[0].wanted.velocity_mps[..., :2], 3.0)
 
 
 def test_a_mission_is_the_same_in_any_batch_and_on_any_number_of_threads():

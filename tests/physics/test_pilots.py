@@ -43,6 +43,13 @@ def test_a_quadrotor_hovers_where_it_began():
     np.testing.assert_allclose(velocity_mps, 0.0, atol=1e-6)
 
 
+def test_its_rotors_hover_with_its_weight():
+    """A quarter of 0.5 kg times g each, once air and lag are at rest."""
+    flown = worlds("quadrotor")
+    course(flown, (0.0, 0.0, 0.0), 20)
+    np.testing.assert_allclose(flown._flown[0].ctrl, 0.25 * 0.5 * 9.81, rtol=1e-6)
+
+
 def test_it_reaches_a_velocity_as_its_pilot_s_poles_say():
     """A first-order lag of 1 / 2.5 s behind the turn of the body: slower at first."""
     _, velocity_mps = course(worlds("quadrotor"), (10.0, 0.0, 0.0), 40)
@@ -88,18 +95,22 @@ def test_a_rotor_that_fails_brings_it_down():
     np.testing.assert_allclose(flown.states.position_m[0, 1, 2], HEIGHT_M, atol=1e-6)
 
 
+def drag_mps2(wind_mps):
+    """MuJoCo's drag of the box with the quadrotor's inertia, of 0.219, 0.219 and 0.088 m."""
+    side_m = np.sqrt(6.0 * 4e-3 / 0.5)
+    flat_m = np.sqrt(6.0 * (2 * 2.32e-3 - 4e-3) / 0.5)
+    return 0.5 * 1.204 * side_m * flat_m * wind_mps**2 / 0.5
+
+
 def test_its_steady_speed_in_a_wind_is_the_set_point_less_what_drag_takes():
     """P control: drag over mass, divided by the gain, is what is left of the velocity's error."""
     calm = worlds("quadrotor")
     windy = worlds("quadrotor", wind_mps=5.0)
-    course(calm, (0.0, 0.0, 0.0), 60)
-    _, velocity_mps = course(windy, (0.0, 0.0, 0.0), 60)
+    course(calm, (0.0, 5.0, 0.0), 60)
+    _, velocity_mps = course(windy, (0.0, 5.0, 0.0), 60)
     drift = velocity_mps[-1, 0]
-    # MuJoCo's drag of the box with this inertia, whose sides are 0.219, 0.219 and 0.088 m.
-    side_m = np.sqrt(6.0 * 4e-3 / 0.5)
-    flat_m = np.sqrt(6.0 * (2 * 2.32e-3 - 4e-3) / 0.5)
-    drag_mps2 = 0.5 * 1.204 * side_m * flat_m * (5.0 - drift) ** 2 / 0.5
-    assert drift == pytest.approx(drag_mps2 / 2.5, rel=0.3)
+    assert drift == pytest.approx(drag_mps2(5.0 - drift) / 2.5, rel=0.3)
+    assert velocity_mps[-1, 1] == pytest.approx(0.5, abs=0.05)
     assert calm.states.velocity_mps[0, 0, 0] == pytest.approx(0.0, abs=1e-6)
 
 
@@ -141,6 +152,33 @@ def test_a_rover_turns_in_the_circle_that_its_speed_and_turn_rate_make():
     assert 0.0 < heading <= RoverPilot.MOST_RPS * 0.5
     _, velocity_mps = course(flown, (0.0, 0.0, 0.0), 40)
     np.testing.assert_allclose(velocity_mps[-1], [0.0, 1.0, 0.0], atol=0.02)
+
+
+@pytest.mark.parametrize(
+    ("speed_mps", "turn_rps"), [(1.0, 0.5), (1.0, 1.0), (1.8, 1.0), (1.0, 2.0)]
+)
+def test_a_rover_s_turn_radius_is_its_speed_over_its_turn_rate(speed_mps, turn_rps):
+    """Behind a set point that turns its heading is late by its turn rate over the pilot's gain.
+
+    So it drives at the cosine of that lag, and in a circle that is smaller by it, too.
+    """
+    flown = worlds("rover", velocity_ratio=0.5)
+    wanted_mps = np.zeros((1, 2, 3))
+    places_m = []
+    for window in range(120):
+        before_mps = wanted_mps.copy()
+        angle = turn_rps * 0.1 * window
+        wanted_mps[0, 0, :2] = speed_mps * np.cos(angle), speed_mps * np.sin(angle)
+        states = flown.step((wanted_mps - before_mps) / 0.1)
+        places_m.append(states.position_m[0, 0, :2])
+    settled_m = np.array(places_m[60:])
+    # The circle of least squares: x² + y² = 2 x a + 2 y b + (r² - a² - b²).
+    sides = np.column_stack([2.0 * settled_m, np.ones(60)])
+    a, b, rest = np.linalg.lstsq(sides, np.sum(settled_m**2, axis=1), rcond=None)[0]
+    lag = turn_rps / 3.0
+    assert np.sqrt(rest + a**2 + b**2) == pytest.approx(
+        speed_mps * np.cos(lag) / turn_rps, rel=0.01
+    )
 
 
 def test_rotors_push_at_their_places():
