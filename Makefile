@@ -189,6 +189,7 @@ figures: setup
 	$(BIN)/python training/readme_figure.py
 	$(BIN)/python training/large_teams_figure.py
 	$(BIN)/python training/rewards_figure.py
+	$(BIN)/python training/crashes_figure.py
 	$(BIN)/python tools/diagrams.py
 
 reproduce: setup

@@ -87,6 +87,7 @@ def draw(found: Sequence[Result]) -> Figure:
             axes.set_ylabel(f"crashed, of {its[0].num_robots} robots")
             axes.set_ylim(bottom=0.0)
         both[-1].set_xlabel("age of information [windows]")
+        both[0].set_ylim(top=1.4 * both[0].get_ylim()[1])  # room for the legend
         both[0].legend(frameon=False, loc="upper left", ncols=3)
         first = found[0]
         said = (
