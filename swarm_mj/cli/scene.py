@@ -78,11 +78,9 @@ def _fly(options: SceneOptions) -> int:
     """Fly the mission in a window; raise ValueError for what has no use there, or no display."""
     if options.out or options.force:
         raise ValueError("--out and --force are of files, and --view writes none; leave them out")
-    if not view.has_display():
-        ways = (
-            "write a file to open elsewhere, by `swarm-mj scene`, or use `swarm-mj fly --live web`"
-        )
-        raise ValueError(f"there is no display (DISPLAY and WAYLAND_DISPLAY are unset); {ways}")
+    view.need_display(
+        "write a file to open elsewhere, by `swarm-mj scene`, or use `swarm-mj fly --live web`"
+    )
     need("glfw", "MuJoCo's viewer")
     from swarm_mj.replay.rendering.scene import SceneViewer  # MuJoCo is slow to import
     from swarm_mj.simulation.swarm import Swarm
@@ -111,6 +109,8 @@ def _fly_once(swarm: "Swarm", viewer: "SceneViewer") -> None:
         recorder.add(window)
         flown = recorder.num_windows
         if flown == 1:  # nothing to move on from
+            viewer.show(recorder.piece({}, 0, 1), 0.0)
+            time.sleep(mission.window_s)
             continue
         before = (flown - 2) // recorder.piece_windows * recorder.piece_windows
         seen = recorder.piece({}, before, flown)

@@ -47,6 +47,7 @@ VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robo
 FARTHEST = 1e6  # no robot of a stable model gets so far [m], or so fast [m/s and rad/s]
 # Of what has crashed [rad/s]: in a storm it tumbles, and Euler's steps would spin it up for ever.
 MOST_TUMBLING_RPS = 100.0
+RESTS_MPS = 1e-6  # a set point slower than this is 0: sums of accelerations end a rounding away
 RETURN_PER_S = 0.6  # speed towards a place over the way to it: a pilot's velocities settle faster
 
 
@@ -61,8 +62,8 @@ class _Flown(NamedTuple):
     ctrl: Float[np.ndarray, "B n U"]
     push: Float[np.ndarray, "B n V"]  # forces of contacts
     sensors: Float[np.ndarray, "B n S"]
-    force: Float[np.ndarray, "B n U"]  # of motors
-    speed: Float[np.ndarray, "B n U"]  # of what they move
+    force_n: Float[np.ndarray, "B n U"]  # of motors; of those that turn, Nm
+    speed_mps: Float[np.ndarray, "B n U"]  # of what they move; of what turns, rad/s
     wanted: SetPoint
     has_crashed: Bool[np.ndarray, "B n"]
     energy_j: Float[np.ndarray, "B n"]
@@ -135,39 +136,40 @@ class BodyWorlds:
 
     def _divide(self, kinds: Sequence[RobotKind], pilots: Sequence[Pilot]) -> list[_Flown]:
         """Return each kind's part of the arrays, whose robots follow each other."""
-        arrays = [self._batch.bind(name) for name in ("qpos", "qvel", "ctrl")]
-        arrays += [self._batch.bind("qfrc_constraint"), self._batch.bind("sensordata")]
-        arrays += [self._batch.bind("actuator_force"), self._batch.bind("actuator_velocity")]
-        starts = [0] * len(arrays)
+        starts: dict[str, int] = {}
+
+        def part(name: str, kind: RobotKind, width: int) -> Float[np.ndarray, "B n W"]:
+            """Return the next robots' part of one of MuJoCo's arrays."""
+            start = starts.get(name, 0)
+            starts[name] = start + kind.num_robots * width
+            array = self._batch.bind(name)[:, start : starts[name]]
+            return array.reshape(len(array), kind.num_robots, width)
+
         found = []
         for kind, pilot in zip(kinds, pilots, strict=True):
             model = kind.model
-            widths = (model.nq, model.nv, model.nu, model.nv, model.nsensordata)
-            widths += (model.nu, model.nu)
-            parts = []
-            for a, (array, width) in enumerate(zip(arrays, widths, strict=True)):
-                after = starts[a] + kind.num_robots * width
-                part = array[:, starts[a] : after]
-                parts.append(part.reshape(len(array), kind.num_robots, width))
-                starts[a] = after
+            qpos = part("qpos", kind, model.nq)
+            qvel = part("qvel", kind, model.nv)
+            sensors = part("sensordata", kind, model.nsensordata)
             robots = slice(kind.first, kind.first + kind.num_robots)
-            wanted = SetPoint(_seen(self._wanted_mps[:, robots]), _seen(self._height_m[:, robots]))
-            qpos, qvel, ctrl, push, sensors, force, speed = parts
             flown = _Flown(
                 kind=kind,
                 pilot=pilot,
                 robots=robots,
                 qpos=qpos,
                 qvel=qvel,
-                ctrl=ctrl,
-                push=push,
+                ctrl=part("ctrl", kind, model.nu),
+                push=part("qfrc_constraint", kind, model.nv),
                 sensors=sensors,
-                force=force,
-                speed=speed,
-                wanted=wanted,
+                force_n=part("actuator_force", kind, model.nu),
+                speed_mps=part("actuator_velocity", kind, model.nu),
+                wanted=SetPoint(
+                    velocity_mps=_seen(self._wanted_mps[:, robots]),
+                    height_m=_seen(self._height_m[:, robots]),
+                ),
                 has_crashed=self._has_crashed[:, robots],
                 energy_j=self._energy_j[:, robots],
-                motors=motors_of(kind.is_motor, kind.declared, self._step_s, AIR_DENSITY),
+                motors=motors_of(kind.lifts, kind.declared, self._step_s, AIR_DENSITY),
                 is_trusted=is_ours(pilot),
                 free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )
@@ -338,7 +340,11 @@ class BodyWorlds:
                 _check_stable(flown)  # before the next step: MuJoCo dies of what is no number
                 if flown.motors is not None:
                     use_energy(
-                        flown.motors, flown.force, flown.speed, flown.has_crashed, flown.energy_j
+                        flown.motors,
+                        flown.force_n,
+                        flown.speed_mps,
+                        flown.has_crashed,
+                        flown.energy_j,
                     )
                 if flown.kind.is_free:
                     _note_contacts(flown.push, flown.has_crashed)
@@ -503,7 +509,7 @@ def _hold_places(
     """
     for b in range(position.shape[0]):
         for i in range(position.shape[1]):
-            rests = course_mps[b, i, 0] == 0.0 and course_mps[b, i, 1] == 0.0
+            rests = abs(course_mps[b, i, 0]) < RESTS_MPS and abs(course_mps[b, i, 1]) < RESTS_MPS
             for axis in range(2):
                 v = course_mps[b, i, axis]
                 p = position[b, i, axis]
@@ -527,6 +533,7 @@ def _note_contacts(push: Float[np.ndarray, "B n V"], has_crashed: Bool[np.ndarra
 
 @compiled(makes_arrays=False)
 def _slow_tumbling(has_crashed: Bool[np.ndarray, "B n"], qvel: Float[np.ndarray, "B n V"]) -> None:
+    """Limit how fast what has crashed turns."""
     for b in range(qvel.shape[0]):
         for i in range(qvel.shape[1]):
             if has_crashed[b, i]:

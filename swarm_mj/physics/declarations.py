@@ -1,6 +1,6 @@
 """Numbers that a robot's MJCF file declares, each as `<numeric name="..." data="..."/>`.
 
-They are of its radio and of its motors. Where its antenna is says a site, `antenna`.
+They are of its radio and of its motors. A site named `antenna` says where its antenna is.
 """
 
 from collections.abc import Mapping
@@ -77,7 +77,8 @@ def declared_by(numerics: Mapping[str, Float[np.ndarray, "_"]]) -> Declarations:
     for name, data in numerics.items():
         if name not in known:
             raise ValueError(
-                f"numeric {name} is none of {', '.join(known)}{did_you_mean(name, known)}"
+                f"numeric {name} is none of {', '.join(known)}{did_you_mean(name, known)}; "
+                "take it out of the file"
             )
         if len(data) != 1:
             raise ValueError(f"numeric {name} must be one number, not {len(data)}; give one")

@@ -20,18 +20,19 @@ from swarm_mj.system.compiled import compiled
 class Motors(NamedTuple):
     """The energy of one step of a robot's U motors; each is a rotor or it is none."""
 
-    of_lift: Float[np.ndarray, "U"]  # of a rotor, by its thrust to the power of 3/2 [J/N^1.5]
+    of_lift: Float[np.ndarray, "U"]  # of a rotor, by its force to the power of 3/2 [J/N^1.5]
     of_work: Float[np.ndarray, "U"]  # of any other, by its power [J/W]
     idle_j: float  # of the robot, at all times
 
 
 def motors_of(
-    is_motor: Bool[np.ndarray, "U"], declared: Declarations, step_s: float, air_density: float
+    lift: Float[np.ndarray, "U"], declared: Declarations, step_s: float, air_density: float
 ) -> Motors | None:
     """Return what the motors of a robot's model use.
 
     Args:
-        is_motor: Whether each of its actuators is a plain motor. These are the rotors of a model
+        lift: How hard each of its plain motors pushes the base, by its force in MuJoCo's sense, to
+            which a gear comes; 0 of all other actuators. Those that push are the rotors of a model
             that declares their radius.
         declared: Its numbers.
         step_s: MuJoCo's step.
@@ -43,12 +44,12 @@ def motors_of(
     if declared.efficiency is None:
         return None
     used_s = step_s / declared.efficiency
-    of_lift = np.zeros(len(is_motor))
-    of_work = np.full(len(is_motor), used_s)
+    of_lift = np.zeros(len(lift))
+    of_work = np.full(len(lift), used_s)
     if declared.rotor_radius_m is not None:
         disk_m2 = math.pi * declared.rotor_radius_m**2
-        of_lift[is_motor] = used_s / math.sqrt(2.0 * air_density * disk_m2)
-        of_work[is_motor] = 0.0
+        of_lift = lift**1.5 * used_s / math.sqrt(2.0 * air_density * disk_m2)
+        of_work[lift > 0.0] = 0.0
     return Motors(of_lift=of_lift, of_work=of_work, idle_j=step_s * declared.idle_power_w)
 
 
@@ -70,7 +71,7 @@ def use_energy(
                 continue
             used_j = motors.idle_j
             for u in range(force_n.shape[2]):
-                lift_n = abs(force_n[b, i, u])
-                used_j += motors.of_lift[u] * lift_n * math.sqrt(lift_n)
+                size_n = abs(force_n[b, i, u])
+                used_j += motors.of_lift[u] * size_n * math.sqrt(size_n)
                 used_j += motors.of_work[u] * max(force_n[b, i, u] * speed_mps[b, i, u], 0.0)
             energy_j[b, i] += used_j

@@ -118,8 +118,13 @@ class RobotKind:
         """True for actuators whose force is their control times a gain, and nothing else."""
         return self.model.actuator_biastype == mjtBias.mjBIAS_NONE
 
-    def _thrust(self) -> Float[np.ndarray, "U 6"]:
-        """Return the force and torque on the base, in its axes, of a control of 1 of each motor."""
+    @property
+    def lifts(self) -> Float[np.ndarray, "U"]:
+        """How hard each motor pushes the base of a robot that flies, by its force before gears."""
+        return np.linalg.norm(self._effects()[:, :3], axis=1)
+
+    def _effects(self) -> Float[np.ndarray, "U 6"]:
+        """Return the force and torque on a free base, in its axes, by each motor's own force."""
         model = self.model
         data = rest_pose(model)
         moment = np.zeros((model.nu, model.nv))
@@ -128,7 +133,7 @@ class RobotKind:
         )
         effect = np.zeros((model.nu, FREE_QVEL))
         width = min(FREE_QVEL, model.nv) if self.is_free else 0
-        effect[:, :width] = moment[:, :width] * model.actuator_gainprm[:, :1]
+        effect[:, :width] = moment[:, :width]
         effect[~self.is_motor] = 0.0
         return effect
 
@@ -153,7 +158,7 @@ class RobotKind:
             actuators=tuple(model.actuator(u).name for u in range(model.nu)),
             least=np.where(is_limited, least, -np.inf),
             most=np.where(is_limited, most, np.inf),
-            thrust=self._thrust(),
+            thrust=self._effects() * model.actuator_gainprm[:, :1],
             sensors=self.sensors,
             step_s=step_s,
         )

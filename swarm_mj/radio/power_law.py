@@ -21,7 +21,7 @@ from swarm_mj.system.compiled import compiled
 SPEED_OF_LIGHT_MPS = 299_792_458.0
 FREE_SPACE_EXPONENT = 2.0
 TWO_RAY_EXPONENT = 4.0
-LEAST_HEIGHT_M = 0.1  # above the floor, which an antenna counts as at least
+LEAST_ANTENNA_M = 0.1  # above the floor, which an antenna counts as at least
 
 
 class PowerLaw(NamedTuple):
@@ -124,8 +124,8 @@ def breakpoint_between(antenna_m: Float[np.ndarray, "N D"], i: int, j: int, law:
     """Return up to where free space holds between two antennas [m]."""
     if not law.is_by_height:
         return law.breakpoint_m
-    first_m = max(antenna_m[i, PLANE], LEAST_HEIGHT_M)
-    other_m = max(antenna_m[j, PLANE], LEAST_HEIGHT_M)
+    first_m = max(antenna_m[i, PLANE], LEAST_ANTENNA_M)
+    other_m = max(antenna_m[j, PLANE], LEAST_ANTENNA_M)
     return law.breakpoint_m * first_m * other_m
 
 

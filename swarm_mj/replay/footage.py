@@ -20,6 +20,16 @@ VIEW = 1.2  # times the area: a team within it lets a replay's map stand still
 NEAR = 1.5  # times the area: robots that stay within it are shown around the area
 
 
+def turned(
+    one: Float[np.ndarray, "N 4"], other: Float[np.ndarray, "N 4"], share: float
+) -> Float[np.ndarray, "N 4"]:
+    """Return attitudes at a share of the way from one to the other, as quaternions."""
+    # Both of a quaternion's signs are the same attitude: the nearer one is the shorter way.
+    is_far = np.sum(one * other, axis=1, keepdims=True) < 0.0
+    between = one + share * (np.where(is_far, -other, other) - one)
+    return between / np.linalg.norm(between, axis=1, keepdims=True)
+
+
 @dataclass(frozen=True, kw_only=True)
 class Ground:
     """The part of the ground that is shown: a square of constant size that may move."""
@@ -168,17 +178,11 @@ class Footage:
             whole[row] = values[before] + share * (values[after] - values[before])
             return whole
 
-        height_m = attitude = None
-        if self.height_m is not None:
-            height_m = moved(self.height_m)
+        height_m = None if self.height_m is None else moved(self.height_m)
+        attitude = None
         if self.attitude is not None:
-            # Both of a quaternion's signs are the same attitude: the nearer one is the shorter way.
-            dots = np.sum(self.attitude[before] * self.attitude[after], axis=1, keepdims=True)
-            near = self.attitude.copy()
-            near[after] *= np.where(dots < 0.0, -1.0, 1.0)
-            attitude = near
-            attitude[row] = near[before] + share * (near[after] - near[before])
-            attitude[row] /= np.linalg.norm(attitude[row], axis=1, keepdims=True)
+            attitude = self.attitude.copy()
+            attitude[row] = turned(self.attitude[before], self.attitude[after], share)
         return replace(
             self, position_m=moved(self.position_m), height_m=height_m, attitude=attitude
         )

@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, NamedTuple
+from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
 
 from swarm_mj.system.interrupt import answer_interrupt
 from swarm_mj.system.processes import PYTHON, running
@@ -49,11 +49,15 @@ def has_display() -> bool:
     return not sys.platform.startswith("linux") or bool(is_named)
 
 
+def need_display(ways: str) -> None:
+    """Raise ValueError without a screen for windows; `ways` says what to do then."""
+    if not has_display():
+        raise ValueError(f"there is no display (DISPLAY and WAYLAND_DISPLAY are unset); {ways}")
+
+
 def view_command(*paths: Path) -> list[str]:
     """Return the command that opens replays in a window; raise ValueError without a display."""
-    if not has_display():
-        ways = "`swarm-mj replay --web FILE`, or `--video FILE.mp4` for a video"
-        raise ValueError(f"there is no display (DISPLAY and WAYLAND_DISPLAY are unset); use {ways}")
+    need_display("use `swarm-mj replay --web FILE`, or `--video FILE.mp4` for a video")
     return [*VIEWER, *map(str, paths)]
 
 
@@ -85,9 +89,8 @@ class LiveViewer(NamedTuple):
 
 def check_live(where: str) -> None:
     """Raise ValueError where a window was asked for, and there is no screen."""
-    if where == WINDOW and not has_display():
-        way = '--live web (in Python live="web") serves it to a browser'
-        raise ValueError(f"there is no display (DISPLAY and WAYLAND_DISPLAY are unset); {way}")
+    if where == WINDOW:
+        need_display('--live web (in Python live="web") serves it to a browser')
 
 
 @contextmanager
@@ -144,9 +147,10 @@ def free_ports(number: int) -> list[int]:
 
 
 # Where a video is seen from.
-MAP = "map"
-CHASE = "chase"
-CAMERAS = (MAP, CHASE)
+Camera = Literal["map", "chase"]
+MAP: Camera = "map"
+CHASE: Camera = "chase"
+CAMERAS: tuple[Camera, ...] = get_args(Camera)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +162,11 @@ class VideoStyle:
     seconds: float = LONGEST_S  # in which the whole mission is shown
     fps: int | float = 25  # pictures per second
     theme: str = "dark"  # a name of `rendering.theme.THEMES`
-    camera: str = MAP  # of `CAMERAS`
+    camera: Camera = MAP
+
+    def __post_init__(self) -> None:
+        if self.camera not in CAMERAS:
+            raise ValueError(f"camera must be {' or '.join(CAMERAS)}, not {self.camera!r}")
 
     @property
     def num_frames(self) -> int:

@@ -9,17 +9,22 @@ from swarm_mj import paper
 from swarm_mj.physics.bodies import BodyWorlds
 from swarm_mj.physics.declarations import Declarations
 from swarm_mj.physics.energy import motors_of, use_energy
+from swarm_mj.system.packages import asset
 
 WINDOW_S = 0.1
-ONE_MOTOR = np.array([True])
+ONE_MOTOR = np.array([1.0])
 
 
 def worlds_of(mission, velocity_mps=0.0):
     """Robots 20 m apart along x, at the heights where they begin, all equally fast along x."""
-    worlds = BodyWorlds(mission, 1)
+    return placed(BodyWorlds(mission, 1), velocity_mps)
+
+
+def placed(worlds, velocity_mps=0.0):
+    """Start such worlds."""
     worlds.start([np.random.default_rng(1)])
-    position_m = np.zeros((1, mission.num_robots, 3))
-    position_m[0, :, 0] = 20.0 * np.arange(mission.num_robots)
+    position_m = np.zeros_like(worlds.states.position_m)
+    position_m[0, :, 0] = 20.0 * np.arange(position_m.shape[1])
     position_m[..., 2] = worlds.draw_heights_m(np.random.default_rng(2))
     velocities_mps = np.zeros_like(position_m)
     velocities_mps[..., 0] = velocity_mps
@@ -97,7 +102,7 @@ def used(motors, force_n, speed_mps):
 
 def test_a_drive_takes_force_times_speed_over_its_efficiency_and_brakes_for_nothing():
     declared = Declarations(efficiency=0.8, idle_power_w=30.0)
-    motors = motors_of(np.array([True, False]), declared, STEP_S, 1.204)
+    motors = motors_of(np.array([1.0, 0.0]), declared, STEP_S, 1.204)
     assert used(motors, [10.0, -4.0], [2.0, -3.0]) == pytest.approx(
         STEP_S * (30.0 + (20.0 + 12.0) / 0.8)
     )
@@ -106,7 +111,7 @@ def test_a_drive_takes_force_times_speed_over_its_efficiency_and_brakes_for_noth
 
 def test_what_is_servoed_on_a_robot_with_rotors_is_no_rotor():
     declared = Declarations(efficiency=0.5, rotor_radius_m=0.2)
-    motors = motors_of(np.array([True, False]), declared, STEP_S, 1.0)
+    motors = motors_of(np.array([1.0, 0.0]), declared, STEP_S, 1.0)
     rotor_w = 9.0**1.5 / math.sqrt(2.0 * math.pi * 0.04)
     expected_j = STEP_S * (rotor_w + 6.0) / 0.5
     assert used(motors, [-9.0, 3.0], [100.0, 2.0]) == pytest.approx(expected_j)
@@ -114,3 +119,18 @@ def test_what_is_servoed_on_a_robot_with_rotors_is_no_rotor():
 
 def test_a_model_without_efficiency_says_nothing():
     assert motors_of(ONE_MOTOR, Declarations(), STEP_S, 1.204) is None
+
+
+def test_a_rotor_is_known_by_what_it_lifts_after_its_gear(tmp_path):
+    """The quadrotor with its scale in the gears, and a hinge that lifts nothing, takes as much."""
+    text = asset("quadrotor.xml").read_text()
+    text = text.replace('gear="0 0 1 0 0 -0.02455"', 'gear="0 0 .001 0 0 -0.00002455"')
+    text = text.replace('gear="0 0 1 0 0 0.02455"', 'gear="0 0 .001 0 0 0.00002455"')
+    text = text.replace('ctrlrange="0.088 3.717"', 'ctrlrange="88 3717"')
+    geared = tmp_path / "geared.xml"
+    geared.write_text(text)
+    pilot = "swarm_mj.physics.pilots:QuadrotorPilot"
+    mission = paper("stationary", robot=str(geared), num_robots=2)
+    worlds = placed(BodyWorlds(mission, 1, pilot=pilot))
+    plain = worlds_of(paper("stationary", robot="quadrotor", num_robots=2))
+    np.testing.assert_allclose(windows(worlds, 5), windows(plain, 5), rtol=1e-6)

@@ -35,6 +35,7 @@ def test_the_scanner_is_the_quadrotor_of_the_package():
     ):
         np.testing.assert_array_equal(getattr(plain, name), getattr(scanner, name), name)
     np.testing.assert_array_equal(plain.site_pos, scanner.site_pos[:4])
+    assert only_kind("quadrotor").declared == only_kind(str(SCANNER)).declared
 
 
 def test_its_rays_look_45_degrees_apart():

@@ -30,6 +30,7 @@ DAMPING_PER_S = 1.0  # c: critical, 2 sqrt(k)
 BLOCK_SHARE = 0.5  # width of the formation over the side of the area
 
 
+# Chosen by hand: a flock draws together in about 20 s, and keeps apart at a few robots' widths.
 COHESION_PER_S2 = 0.05
 APART_M = 20.0  # robots nearer than this push each other away
 SEPARATION_MPS2 = 3.0  # the push of one that is all but touched
@@ -60,11 +61,7 @@ class Formation:
 
         The formation may stand anywhere, but not turned: the places are those of the best fit.
         """
-        off_m = states.position_m[..., :2] - self._place_m
-        if states.is_active is not None:
-            off_m = off_m[states.is_active].reshape(len(off_m), -1, 2)
-        off_m = off_m - np.mean(off_m, axis=1, keepdims=True)
-        return np.sqrt(np.mean(np.sum(off_m**2, axis=2), axis=1))
+        return spread_m(states.position_m[..., :2] - self._place_m, states.is_active)
 
 
 def block(num_robots: int, width_m: float) -> Float[np.ndarray, "N 2"]:
@@ -155,9 +152,9 @@ def _keep_together(
 @compiled()
 def _mean_places(
     is_known: Bool[np.ndarray, "B N N"],
-    known_m: Float[np.ndarray, "B N N 2"],
+    known_m: Float[np.ndarray, "B N N D"],
     place_m: Float[np.ndarray, "N 2"],
-    target_m: Float[np.ndarray, "B N 2"],
+    target_m: Float[np.ndarray, "B N D"],
 ) -> None:
     for b in range(is_known.shape[0]):
         for i in range(is_known.shape[1]):
@@ -174,9 +171,9 @@ def _mean_places(
 @compiled()
 def _centroids(
     is_known: Bool[np.ndarray, "B N N"],
-    known_m: Float[np.ndarray, "B N N 2"],
+    known_m: Float[np.ndarray, "B N N D"],
     half_side_m: float,
-    target_m: Float[np.ndarray, "B N 2"],
+    target_m: Float[np.ndarray, "B N D"],
 ) -> None:
     """Turn positions into targets; without a cell, that is the nearest point of the area."""
     for b in range(is_known.shape[0]):
@@ -191,7 +188,7 @@ def _centroids(
 
 @compiled()
 def _mean_squares(
-    position_m: Float[np.ndarray, "B N 2"], half_side_m: float, counts: Bool[np.ndarray, "B N"]
+    position_m: Float[np.ndarray, "B N D"], half_side_m: float, counts: Bool[np.ndarray, "B N"]
 ) -> Float[np.ndarray, "B"]:
     """Sum up the second moments of the cells of robots that count, over the area [m²]."""
     cost = np.zeros(len(position_m))
@@ -205,7 +202,7 @@ def _mean_squares(
 
 @compiled()
 def cell(
-    position_m: Float[np.ndarray, "N 2"], counts: Bool[np.ndarray, "N"], i: int, half_side_m: float
+    position_m: Float[np.ndarray, "N D"], counts: Bool[np.ndarray, "N"], i: int, half_side_m: float
 ) -> Float[np.ndarray, "corners 2"]:
     """Return the corners of robot i's Voronoi cell in the area, anticlockwise [m].
 
@@ -226,7 +223,7 @@ def cell(
 
 @compiled()
 def _nearer(
-    polygon: Float[np.ndarray, "corners 2"], position_m: Float[np.ndarray, "N 2"], i: int, j: int
+    polygon: Float[np.ndarray, "corners 2"], position_m: Float[np.ndarray, "N D"], i: int, j: int
 ) -> Float[np.ndarray, "corners 2"]:
     """Clip a polygon along the bisector of i and j (Sutherland and Hodgman 1974)."""
     across_x, across_y = position_m[j, 0] - position_m[i, 0], position_m[j, 1] - position_m[i, 1]

@@ -251,9 +251,10 @@ def _bodies(flown: FlownWindows, row: int) -> SceneEntity:
     size = Vector3(x=2.0 * radius_m, y=2.0 * radius_m, z=radius_m)
     cylinders: list[CylinderPrimitive] = []
     places_m = flown.place_m[row].tolist()
+    up_m = 0.0 if flown.has_bodies else 0.5 * radius_m  # points lie on the floor
     colours = footage.colours[row].tolist()
     for (x_m, y_m, z_m), turn, colour in zip(places_m, _turns(flown, row), colours, strict=True):
-        place = Vector3(x=x_m, y=y_m, z=z_m + 0.5 * radius_m)
+        place = Vector3(x=x_m, y=y_m, z=z_m + up_m)
         cylinders.append(
             CylinderPrimitive(
                 pose=Pose(position=place, orientation=turn),

@@ -55,6 +55,8 @@ CHASE_DEG = 9.0  # above it
 CHASE_UP = 0.14  # of that distance: it looks above the robot, which leaves the view ahead free
 CHASE_FOV_Y_DEG = 52.0  # a short lens, which sees the team around
 CHASE_S = 2.0  # before and after: over which its course is the mean
+# It looks along the course of these seconds; these count beside it, as that many metres of it do.
+WAY_M, TEAM_M, NORTH_M = 0.1, 0.01, 1e-6
 CHASE_RISE = 0.05  # of packets' arcs: higher ones would leave the view
 CHASE_NEAR_M = 0.2  # nearer things are not drawn
 COVER = 1.05  # the least radius of a point's ball, by that of the white ball that MuJoCo has of it
@@ -154,10 +156,11 @@ def chase(footage: Footage, moment: float, width: int, height: int) -> Camera:
     for sign in (-1.0, 1.0):
         other = min(max(0.0, moment + sign * reach), float(last))
         course_m += sign * footage.moved_to(other).position_m[round(other), robot]
-    # Less and less weight: for a robot that hardly moves, and for one alone at rest.
-    course_m += 0.1 * _unit(footage.velocity_mps[row, robot])
-    course_m += 0.01 * _unit(np.mean(place_m[:, :2], axis=0) - place_m[robot, :2])
-    course_m += (0.0, 1e-6)
+    # Of less and less weight: where a robot that hardly moves goes, where the team of one at rest
+    # is, and north of one that is alone.
+    course_m += WAY_M * _unit(footage.velocity_mps[row, robot])
+    course_m += TEAM_M * _unit(np.mean(place_m[:, :2], axis=0) - place_m[robot, :2])
+    course_m += (0.0, NORTH_M)
     distance_m = CHASE_POINT_M if footage.height_m is None else CHASE_M
     target_m = place_m[robot] + (0.0, 0.0, CHASE_UP * distance_m)
     return Camera(
@@ -174,7 +177,8 @@ def chase(footage: Footage, moment: float, width: int, height: int) -> Camera:
 
 def _unit(vector: Float[np.ndarray, "2"]) -> Float[np.ndarray, "2"]:
     """Return a vector at length 1, or 0 if it has none."""
-    return vector / max(float(np.linalg.norm(vector)), 1e-9)
+    length = float(np.linalg.norm(vector))
+    return vector / length if length > 0.0 else vector
 
 
 def draw_markers(
