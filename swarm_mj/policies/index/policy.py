@@ -114,8 +114,16 @@ class IndexCsma(SensingPolicy):
 
         A robot that has sent nothing yet is not silent.
         """
-        silence = views.silence
         slot = int(slot_of(views.now)[0])  # the clocks of all missions are alike
+        contention = self._by_index(views, slot)
+        turn, place = divmod(slot, TURN_EVERY)
+        if place == TURN_EVERY - 1:
+            return in_turn(views, turn)
+        return contention
+
+    def _by_index(self, views: LocalViews, slot: int) -> Contention:
+        """Note the slot that has ended, and return the contention of one that is no turn."""
+        silence = views.silence
         heard = views.phases[-1].heard if views.phases else silence
         recipient = views.phases[-1].recipient if views.phases else silence
         has_sent = recipient != silence
@@ -151,9 +159,6 @@ class IndexCsma(SensingPolicy):
             minislot=share,
             shift_db=shift_db,
         )
-        turn, place = divmod(slot, TURN_EVERY)
-        if place == TURN_EVERY - 1:
-            return in_turn(views, turn)
         minislot = np.floor(self._num_minislots * share)
         minislot[share == 1.0] = self._num_minislots - 1.0
         return Contention(minislot, self._busy_dbm + shift_db)
