@@ -10,7 +10,7 @@ from typing import Any, NamedTuple
 from rich.console import Console
 from rich.table import Table
 
-from swarm_mj.cli import bench_decisions
+from swarm_mj.cli import bench_bodies, bench_decisions
 from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
 from swarm_mj.policies.registry import POLICIES, SHIPPED
@@ -21,6 +21,7 @@ from swarm_mj.system.terminal import num_cores, plain_console, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
+BODY_MISSIONS = (8, 32)  # side by side, of robots with bodies
 BUSY = 0.3  # the spread from which on numbers say little
 LEGEND = """
 window: 100 ms of a mission. The indented rows below the line are its parts.
@@ -30,6 +31,7 @@ arena blocks: costs most in MuJoCo, which looks for contacts in each of its ten 
 time to decide: processor time of one thread, which decides for all robots, in the mean of the first
 120 windows of a mission. The planner's includes its plans, once in half as many windows as there
 are robots. Where robots walk, planner --payload none flies as spatial-tdma.
+quadrotors: MuJoCo takes 20 steps a window for them, and their pilot steers in each.
 team decision: the network decides for all robots of a team, in one window.
 process: its largest memory. team: its memory beyond that of a team of three robots, and below it
 what `fly` estimates."""
@@ -191,6 +193,13 @@ def _tables(options: BenchOptions, say: Callable[[str], None]) -> Iterator[Measu
 
         rows = bench_learning.learning_rows(threads=options.threads, seconds=options.seconds)
         yield Measured("Learning: 40 robots at rest", {"": list(rows)})
+    say("Measuring robots with bodies ...")
+    columns = {
+        str(num_missions): list(bench_bodies.body_rows(num_missions, options.seconds))
+        for num_missions in BODY_MISSIONS
+    }
+    title = "Robots with bodies: 40 quadrotors walk at random, policy round-robin"
+    yield Measured(title, columns, head="missions side by side")
 
 
 def _table(measured: Measured) -> Table:

@@ -5,7 +5,7 @@ import mmap
 
 import pytest
 
-from swarm_mj.cli import bench_decisions, bench_learning, bench_simulation, main
+from swarm_mj.cli import bench_bodies, bench_decisions, bench_learning, bench_simulation, main
 from swarm_mj.cli.bench import noise
 from swarm_mj.cli.bench_simulation import Row
 
@@ -27,12 +27,15 @@ def test_bench_prints_the_whole_and_its_parts(succeed, tmp_path):
     for row in ("Evaluation: 1 random walks", "round-robin, mst, --jobs 2", "greedy-oracle"):
         assert row in done.stdout
     assert "Learning" not in done.stdout
-    assert "noise: the plain step was measured 5 times, from" in done.stdout.splitlines()[-1]
+    assert tables[-1]["title"].startswith("Robots with bodies: 40 quadrotors")
+    assert tables[-1]["columns"] == ["8", "32"]
+    assert "noise: the plain step was measured 6 times, from" in done.stdout.splitlines()[-1]
 
 
 @pytest.fixture
 def quick(monkeypatch, here):
     """A bench whose slow sections take no time; every policy decides in 1234.56 µs."""
+    monkeypatch.setattr(bench_bodies, "body_rows", lambda *_: iter([Row("window", 3.5)]))
     row = Row("train --credit team", 12.34, "{:.1f} / s")
     monkeypatch.setattr(bench_learning, "learning_rows", lambda **_: iter([row]))
     decided = lambda _, names, __: [Row(name, 1234.56, "{:,.1f} µs") for name in names]  # noqa: E731
@@ -53,8 +56,8 @@ def test_bench_shows_learning_and_leaves_the_evaluation_out(quick, capsys):
     assert "gnn │ 1,234.6 µs │ 1,234.6 µs" in said
     written = json.loads((quick / "new" / "b.json").read_text())
     assert (written["threads"], written["seconds"]) == (1, 0.1)
-    assert len(written["noise"]["plain_step_us"]) == 5  # before, and after each table
-    *_, decided, learned = written["tables"]
+    assert len(written["noise"]["plain_step_us"]) == 6  # before, and after each table
+    *_, decided, learned, _bodies = written["tables"]
     assert decided["columns"] == ["walking", "stationary"]
     gnn = {"name": "gnn", "values": [1234.56, 1234.56], "unit": "µs"}
     assert gnn in decided["rows"]
