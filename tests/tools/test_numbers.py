@@ -30,9 +30,10 @@ RECIPES = {QUICK / "recipes.csv"}
 HOPS = {QUICK / "fig3.csv"}
 REWARDS = {QUICK / "rewards.csv"}
 BODIES = {RESULTS / "bodies.csv"}
+FALLS = {RESULTS / "falls.csv"}
 NEWER = (
     *(CONVERGING, LOOKAHEAD, INDEX, ONE, AT_ONE_POINT, ONE_ELSEWHERE, ONE_IN_CITY, RECIPES),
-    *(HOPS, REWARDS, BODIES),
+    *(HOPS, REWARDS, BODIES, FALLS),
 )
 
 
