@@ -9,6 +9,7 @@ import numpy as np
 from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
+from swarm_mj.mission.faults import MIN_SURVIVORS
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.agreement import AGREED, perfect_rate
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
@@ -97,9 +98,7 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     rows["decentralised"] = CENTRE if summary.is_centralised else "yes"
     rows |= _task_costs(mission, summary)
     if summary.crashed is not None:
-        rows["robots crashed"] = (
-            f"{summary.crashed}; off from then on" if summary.crashed else "none"
-        )
+        rows["robots crashed"] = _crashed(mission.num_robots, summary.crashed)
     if summary.energy_mean_j is not None:
         rows["energy per robot; most"] = (
             f"{summary.energy_mean_j:,.0f} J; {summary.energy_worst_j:,.0f} J"
@@ -143,6 +142,15 @@ def _packets(summary: FlightSummary) -> dict[str, str]:
     else:
         rows["  overheard by other robots"] = f"{summary.packets_overheard} times"
     return rows
+
+
+def _crashed(num_robots: int, num_crashed: int) -> str:
+    """Return how many robots crashed, in words."""
+    if num_crashed == 0:
+        return "none"
+    if num_robots - num_crashed < MIN_SURVIVORS:
+        return f"{num_crashed} of {num_robots}; the age is of two whose radios stay on"
+    return f"{num_crashed} of {num_robots}; off from then on"
 
 
 def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:

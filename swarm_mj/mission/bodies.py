@@ -137,7 +137,7 @@ class Bodies(Team):
         if total != self.num_robots:
             raise ValueError(
                 f"robot {self.robot} are {total} robots, but the team has {self.num_robots}; "
-                f"choose {total} robots, or other numbers"
+                f"choose {total} robots (--robots {total}), or other numbers"
             )
         return found
 

@@ -50,6 +50,7 @@ class Team:
     )
     density_per_km2: float = setting(
         40.0,
+        "robots in a square kilometre: it sets the size of the area",
         label="density",
         unit="robots/km²",
         low=0.1,

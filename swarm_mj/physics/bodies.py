@@ -357,12 +357,9 @@ class BodyWorlds:
     def _steer(self) -> None:
         """Let the pilots write all controls; those of robots that crashed are 0."""
         for flown in self._flown:
-            flown.pilot(_sensed(flown), flown.wanted, flown.ctrl)
-            if not flown.is_trusted and not np.all(np.isfinite(flown.ctrl)):
-                raise ValueError(
-                    f"the pilot of {flown.kind.name} must write finite controls, not "
-                    f"{flown.ctrl[~np.isfinite(flown.ctrl)][0]:g}"
-                )
+            answer: object = flown.pilot(_sensed(flown), flown.wanted, flown.ctrl)
+            if not flown.is_trusted:
+                _check_written(flown, answer)
             _stop(flown.has_crashed, flown.ctrl)
 
     def _take_states(self) -> None:
@@ -389,6 +386,23 @@ class BodyWorlds:
             has_crashed=self._has_crashed.copy(),
             sensors=sensors,
             energy_j=self._energy_j.copy(),
+        )
+
+
+def _check_written(flown: _Flown, answer: object) -> None:
+    """Raise TypeError or ValueError for a user's pilot that did not write its controls."""
+    name = flown.kind.name
+    if answer is not None:
+        raise TypeError(
+            f"the pilot of {name} must write its controls into `control`, and return nothing"
+        )
+    is_wrong = ~np.isfinite(flown.ctrl)
+    if np.any(is_wrong):
+        b, i, u = np.argwhere(is_wrong)[0]
+        control = flown.kind.model.actuator(u).name or f"number {u}"
+        raise ValueError(
+            f"the pilot of {name} must write finite controls, not {flown.ctrl[b, i, u]:g}, which "
+            f"robot {flown.kind.first + i} has for {control}"
         )
 
 

@@ -33,6 +33,8 @@ LEAST_STEP_S = 0.0005
 MOST_STEP_S = 0.01
 FREE_QPOS = 7  # of a free base: a place and a quaternion
 FREE_QVEL = 6  # of a free base: velocity and turn rate
+USUAL_GRAVITY_MPS2 = [0.0, 0.0, -9.81]  # MuJoCo's own
+PLANAR_AXES = [0, 1, 5]  # of the six, which one on a plane has: along x and y, about z
 PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
 ANTENNA = "antenna"  # the site where a model has it
 MOST_ANTENNA_M = 10.0  # above or below the base
@@ -120,20 +122,20 @@ class RobotKind:
 
     @property
     def lifts(self) -> Float[np.ndarray, "U"]:
-        """How hard each motor pushes the base of a robot that flies, by its force before gears."""
+        """How hard each motor pushes the base, by its force before gears."""
         return np.linalg.norm(self._effects()[:, :3], axis=1)
 
     def _effects(self) -> Float[np.ndarray, "U 6"]:
-        """Return the force and torque on a free base, in its axes, by each motor's own force."""
+        """Return the force and torque on the base, in its axes, by each motor's own force."""
         model = self.model
         data = rest_pose(model)
         moment = np.zeros((model.nu, model.nv))
         mju_sparse2dense(
             moment, data.actuator_moment, data.moment_rownnz, data.moment_rowadr, data.moment_colind
         )
+        axes = list(range(FREE_QVEL)) if self.is_free else PLANAR_AXES
         effect = np.zeros((model.nu, FREE_QVEL))
-        width = min(FREE_QVEL, model.nv) if self.is_free else 0
-        effect[:, :width] = moment[:, :width]
+        effect[:, axes] = moment[:, : len(axes)]
         effect[~self.is_motor] = 0.0
         return effect
 
@@ -429,6 +431,12 @@ def _fault_of_parts(model: MjModel) -> str:
     if not LEAST_STEP_S <= step_s <= MOST_STEP_S:
         limits = f"from {LEAST_STEP_S:g} to {MOST_STEP_S:g} s"
         return f"its timestep must be {limits}, not {step_s:g}; give <option timestep/>"
+    gravity_mps2 = model.opt.gravity.tolist()
+    if gravity_mps2 != USUAL_GRAVITY_MPS2 or np.any(model.opt.wind):
+        return (
+            f"gravity is {-USUAL_GRAVITY_MPS2[2]:g} m/s² here, and wind the mission's; take them "
+            "out of its option"
+        )
     if model.neq + model.ntendon > 0:
         return "it has equalities or tendons, which are not supported"
     return _fault_of_antenna(model)

@@ -23,6 +23,10 @@ class ReplaySize(NamedTuple):
     window: float
     robot: float  # in each window
     matrix: float  # of each byte of the age matrices
+    # What robots with bodies take besides:
+    bodies: float  # however many they are
+    body: float  # of each, its shapes
+    pose: float  # of each, in each window
 
     def of(self, mission: Mission, num_windows: int) -> float:
         """Return the size of the replay of so long a flight [bytes]."""
@@ -30,10 +34,18 @@ class ReplaySize(NamedTuple):
         matrix = AGE_BYTES * len(in_matrix(num_robots)) ** 2
         matrices = min(MAX_AGE_MATRIX_BYTES, num_windows * matrix)
         a_window = self.window + self.robot * num_robots
-        return self.base + a_window * num_windows + self.matrix * matrices
+        size = self.base + a_window * num_windows + self.matrix * matrices
+        if mission.has_bodies:
+            size += self.bodies + (self.body + self.pose * num_windows) * num_robots
+        return size
 
 
 # Of measured peaks, when a replay is written, and of files of teams that move; others' are smaller.
-# The age matrices are copied in memory and compressed in the file.
-IN_MEMORY = ReplaySize(base=0.16 * GB, window=15e3, robot=750.0, matrix=3.3)
-ON_DISK = ReplaySize(base=0.5e6, window=800.0, robot=110.0, matrix=0.04)
+# The age matrices are copied in memory and compressed in the file. Bodies are quadrotors of seven
+# shapes, in teams of 40 to 200; their poses are hidden in memory by all else.
+IN_MEMORY = ReplaySize(
+    base=0.16 * GB, window=15e3, robot=750.0, matrix=3.3, bodies=22e6, body=0.42e6, pose=0.0
+)
+ON_DISK = ReplaySize(
+    base=0.5e6, window=800.0, robot=110.0, matrix=0.04, bodies=0.0, body=38e3, pose=52.0
+)

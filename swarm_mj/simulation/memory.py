@@ -18,7 +18,9 @@ from swarm_mj.system.user_code import load
 LIBRARIES = 0.15 * GB  # compiling included
 FLYING = 0.055 * GB  # of these, what a single flight takes whose code is compiled already
 TORCH = 0.4 * GB  # with the code that trains
-ROBOT = 8.5e3  # in MuJoCo's model, however many missions there are [bytes]
+# Of a robot in MuJoCo's model, however many missions there are [bytes].
+ROBOT = 8.5e3  # a point
+BODY = 66e3  # a quadrotor
 # Of a mission and each pair of its robots [bytes].
 PAIR = 57.0  # the tables of robots, costs and the radio
 LEARNED_PAIR = 450.0  # these, and the network's input
@@ -51,7 +53,8 @@ def policy_memory(policy: str, mission: Mission, num_missions: int = 1) -> float
     about = about_of(policy)
     own_pair = 0.0 if about is None else about.memory.of(mission)
     pairs = num_missions * mission.num_robots**2
-    return LIBRARIES + ROBOT * mission.num_robots + (PAIR + own_pair) * pairs
+    robot = BODY if mission.has_bodies else ROBOT
+    return LIBRARIES + robot * mission.num_robots + (PAIR + own_pair) * pairs
 
 
 def learned_memory(num_robots: int, num_missions: int, *, remembers_packets: bool) -> float:

@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 
+from swarm_mj.cli import bench_bodies
 from swarm_mj.cli.bench_bodies import (
     IN_STEPS,
     PLAIN_STEP,
@@ -35,12 +36,13 @@ def test_plain_steps_are_all_of_the_first_mission_s_quadrotors_as_they_fly(monke
         stepped.append((model.opt.timestep, height_m.copy(), data.qvel.copy()))
         data.qpos[:] = 0.0
 
-    monkeypatch.setitem(step.__globals__, "mj_step", note)
+    monkeypatch.setattr(bench_bodies, "mj_step", note)
     swarm.start(RoundRobin())
     swarm.step()  # changes nothing of what is timed
     for _ in range(3):
         step()
     start_mps = Swarm(swarm.mission, [5]).states.velocity_mps[0]
+    assert len(stepped) == 3
     for step_s, height_m, qvel in stepped:
         assert step_s == 0.005
         assert np.all(height_m == 20.0)

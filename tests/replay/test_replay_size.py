@@ -5,12 +5,20 @@ import pytest
 from swarm_mj.mission import paper
 from swarm_mj.replay.replay_size import ReplaySize, in_matrix
 
-FIT = ReplaySize(base=1000.0, window=100.0, robot=10.0, matrix=2.0)
+FIT = ReplaySize(
+    base=1000.0, window=100.0, robot=10.0, matrix=2.0, bodies=500.0, body=50.0, pose=5.0
+)
 
 
 def test_a_replay_has_a_base_windows_robots_and_matrices():
     """Of 3 robots, a matrix of float32 has 4 x 9 bytes; two windows have two."""
     assert FIT.of(paper(num_robots=3), 2) == 1000.0 + 2 * (100.0 + 3 * 10.0) + 2.0 * 2 * 36
+
+
+def test_bodies_take_more_once_and_in_each_window():
+    flat = FIT.of(paper(num_robots=3), 2)
+    more = FIT.of(paper(num_robots=3, robot="rover"), 2) - flat
+    assert more == 500.0 + 3 * 50.0 + 2 * 3 * 5.0
 
 
 def test_matrices_take_no_more_than_their_limit():

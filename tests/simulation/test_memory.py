@@ -8,6 +8,7 @@ from swarm_mj.policies.index.weights import START, as_tensors
 from swarm_mj.policies.policy_config import IndexConfig
 from swarm_mj.policies.stored import save_weights
 from swarm_mj.simulation.memory import (
+    BODY,
     HEARD_ENTRY,
     LEARNED_PAIR,
     LIBRARIES,
@@ -37,6 +38,13 @@ MISSION = paper("random-walk", num_robots=10, num_windows=16)
 def test_tables_grow_with_pairs_and_missions_and_by_what_the_policy_says(policy, own_pair):
     expected = LIBRARIES + ROBOT * 10 + (PAIR + own_pair) * 3 * 10**2
     assert policy_memory(policy, MISSION, 3) == pytest.approx(expected)
+
+
+def test_robots_with_bodies_take_more_in_mujoco_s_model():
+    """Alike in all missions, as the model is one."""
+    tall = paper("random-walk", num_robots=10, num_windows=16, robot="quadrotor:4,rover:6")
+    more = policy_memory("tdma", tall, 3) - policy_memory("tdma", MISSION, 3)
+    assert more == pytest.approx((BODY - ROBOT) * 10)
 
 
 def test_a_network_takes_its_input_and_the_packets_that_it_remembers(tmp_path):

@@ -31,9 +31,10 @@ HOPS = {QUICK / "fig3.csv"}
 REWARDS = {QUICK / "rewards.csv"}
 BODIES = {RESULTS / "bodies.csv"}
 CRASHES = {RESULTS / "crashes.csv"}
+FALLS = {RESULTS / "falls.csv"}
 NEWER = (
     *(CONVERGING, LOOKAHEAD, INDEX, ONE, AT_ONE_POINT, ONE_ELSEWHERE, ONE_IN_CITY, RECIPES),
-    *(HOPS, REWARDS, BODIES, CRASHES),
+    *(HOPS, REWARDS, BODIES, CRASHES, FALLS),
 )
 
 
