@@ -22,7 +22,7 @@ from mujoco._structs import MjData, MjModel
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arena_files import read_mjcf, refused, take_over_settings
 from swarm_mj.physics.declarations import Declarations, declared_by
-from swarm_mj.physics.pilots import Airframe, Pilot, QuadrotorPilot, RoverPilot
+from swarm_mj.physics.pilots import GRAVITY_MPS2, Airframe, Pilot, QuadrotorPilot, RoverPilot
 from swarm_mj.physics.state import Antennas
 from swarm_mj.system.arguments import check_callable, did_you_mean
 from swarm_mj.system.decibels import from_db
@@ -33,7 +33,6 @@ LEAST_STEP_S = 0.0005
 MOST_STEP_S = 0.01
 FREE_QPOS = 7  # of a free base: a place and a quaternion
 FREE_QVEL = 6  # of a free base: velocity and turn rate
-USUAL_GRAVITY_MPS2 = [0.0, 0.0, -9.81]  # MuJoCo's own
 PLANAR_AXES = [0, 1, 5]  # of the six, which one on a plane has: along x and y, about z
 PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
 ANTENNA = "antenna"  # the site where a model has it
@@ -431,11 +430,10 @@ def _fault_of_parts(model: MjModel) -> str:
     if not LEAST_STEP_S <= step_s <= MOST_STEP_S:
         limits = f"from {LEAST_STEP_S:g} to {MOST_STEP_S:g} s"
         return f"its timestep must be {limits}, not {step_s:g}; give <option timestep/>"
-    gravity_mps2 = model.opt.gravity.tolist()
-    if gravity_mps2 != USUAL_GRAVITY_MPS2 or np.any(model.opt.wind):
+    if model.opt.gravity.tolist() != [0.0, 0.0, -GRAVITY_MPS2] or np.any(model.opt.wind):
         return (
-            f"gravity is {-USUAL_GRAVITY_MPS2[2]:g} m/s² here, and wind the mission's; take them "
-            "out of its option"
+            f"gravity is {GRAVITY_MPS2:g} m/s² here, and wind the mission's; take both out of its "
+            "option"
         )
     if model.neq + model.ntendon > 0:
         return "it has equalities or tendons, which are not supported"

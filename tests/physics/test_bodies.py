@@ -268,8 +268,19 @@ def test_a_pilot_that_writes_no_numbers_is_named(box):
             control[:] = np.nan
 
     mission = paper("stationary", robot=box, num_robots=2)
-    with pytest.raises(ValueError, match="must write finite controls, not nan"):
+    said = "must write finite controls, not nan, which robot 0 has for lift"
+    with pytest.raises(ValueError, match=said):
         flown(mission, [1], 2, pilot=Lost())
+
+
+def test_a_pilot_that_returns_its_controls_is_refused(box):
+    class Returning:
+        def __call__(self, _sensed, _wanted, control):
+            return np.ones_like(control)
+
+    mission = paper("stationary", robot=box, num_robots=2)
+    with pytest.raises(TypeError, match="write its controls into `control`, and return nothing"):
+        flown(mission, [1], 2, pilot=Returning())
 
 
 def test_a_pilot_is_a_class_too_and_begins_anew_with_every_mission(box):

@@ -77,6 +77,15 @@ def test_a_robot_s_numbers_are_those_of_its_file():
     assert airframe.most[0] == pytest.approx(6.11e-8 * 7800**2, rel=1e-3)
 
 
+def test_a_rover_s_motors_push_along_and_turn_it():
+    """Its third actuator, the grip, is no motor: its force follows its speed."""
+    [rover] = kinds_of(paper(robot="rover", num_robots=2))
+    thrust = rover.airframe(0.005).thrust
+    np.testing.assert_allclose(thrust[0], [1.0, 0.0, 0.0, 0.0, 0.0, 0.0])
+    np.testing.assert_allclose(thrust[1], [0.0, 0.0, 0.0, 0.0, 0.0, 1.0])
+    assert not np.any(thrust[2])
+
+
 def test_kinds_follow_each_other():
     mission = paper(robot="quadrotor:3,rover:2", num_robots=5)
     first, second = kinds_of(mission)
@@ -141,6 +150,8 @@ def test_an_own_pilot_for_one_of_two_shipped_kinds_is_refused():
         (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + APART), "sensor of what is not in"),
         (mjcf(body=with_antenna("0.1 0 0.3")), r"right above or below its base.*\(0.1, 0, 0.3\) m"),
         (mjcf(body=with_antenna("0 0 11")), "at most 10 m away"),
+        (mjcf(option='<option gravity="0 0 -1.6"/>'), "gravity is 9.81 m/s² here"),
+        (mjcf(option='<option wind="3 0 0"/>'), "wind the mission's; take both out"),
         (mjcf(option=declaring("antena_gain", 2)), "did you mean antenna_gain_dbi"),
         (mjcf(option=declaring("efficiency", 2)), "efficiency must be a number from 0.01 to 1"),
     ],

@@ -122,7 +122,7 @@ def test_positions_of_bodies_have_heights_and_a_schema_that_says_so(climbing):
 
 
 def test_discs_and_lines_of_bodies_are_at_their_heights(flown_high, bodies):
-    """A little above: half a disc's height, and a whole one for lines."""
+    """Lines are a little above, by the height of a disc."""
     above_m = 0.02 * bodies.footage.ground.reach_m
     num_lines = 0
     for number, (_, message) in enumerate(read(flown_high, "/scene")):
@@ -132,7 +132,7 @@ def test_discs_and_lines_of_bodies_are_at_their_heights(flown_high, bodies):
         for entity in message.entities:
             if entity.id == "robots":
                 found_m = [each.pose.position.z for each in entity.cylinders]
-                np.testing.assert_allclose(found_m, height_m + 0.5 * above_m, atol=1e-9)
+                np.testing.assert_allclose(found_m, height_m, atol=1e-9)
                 turns = [each.pose.orientation.w for each in entity.cylinders]
                 np.testing.assert_allclose(turns, bodies.footage.attitude[k, :, 0], atol=1e-9)
             for line in entity.lines:
