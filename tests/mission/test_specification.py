@@ -56,7 +56,6 @@ def test_the_bare_mission_is_the_papers_text_with_walls():
 
 # Fields that are no options: what the paper fixes, and where its text and its authors' code differ.
 NO_OPTIONS = {
-    "density_per_km2",
     "max_acceleration_mps2",
     "window_s",
     "frequency_hz",
