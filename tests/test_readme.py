@@ -23,6 +23,7 @@ FENCE = re.compile(
 )
 # Why a block may stand unrun, and what it then has to mention.
 REASONS = {
+    "a part of a file": r"<custom>",
     "opens a viewer": "replay|view|show|human",
     "needs OpenGL": "video|render",
     "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari",
