@@ -1,13 +1,13 @@
 """Models of stable-baselines3 as policies: they fly as they decide in their environment."""
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
 from sb3_contrib import QRDQN, MaskablePPO, RecurrentPPO
 from sb3_contrib.common.maskable.evaluation import evaluate_policy
-from scanners import SCANNERS
 from stable_baselines3 import A2C, DQN, PPO
 from stable_baselines3.common.torch_layers import BaseFeaturesExtractor
 from stable_baselines3.common.vec_env import VecNormalize
@@ -21,6 +21,11 @@ from swarm_mj.simulation.swarm import Swarm
 
 torch.set_num_threads(1)
 SMALL = {"num_robots": 4, "num_windows": 8, "range_ratio": 0.4}
+# Not from another file of the tests: where a stored model is loaded, this one is imported alone.
+SCANNERS = {
+    "robot": str(Path(__file__).parents[2] / "training" / "examples" / "scanner.xml"),
+    "pilot": "training.examples.scanning:Scanning",
+}
 
 
 class Rows(BaseFeaturesExtractor):
