@@ -149,7 +149,7 @@ def _crashed(num_robots: int, num_crashed: int) -> str:
     if num_crashed == 0:
         return "none"
     if num_robots - num_crashed < MIN_SURVIVORS:
-        return f"{num_crashed} of {num_robots}; the age is of two whose radios stay on"
+        return f"{num_crashed} of {num_robots}; two radios stay on"
     return f"{num_crashed} of {num_robots}; off from then on"
 
 

@@ -120,7 +120,9 @@ def test_only_bodies_crash():
     walk = summary(**BROADCAST)
     assert row not in shown("tdma", "random-walk", walk)[0]
     assert shown("tdma", "random-walk", walk, crashed=0)[0][row] == "none"
-    assert shown("tdma", "random-walk", walk, crashed=3)[0][row] == "3; off from then on"
+    assert shown("tdma", "random-walk", walk, crashed=3)[0][row] == "3 of 7; off from then on"
+    most = shown("tdma", "random-walk", walk, crashed=6)[0][row]
+    assert most == "6 of 7; two radios stay on"
 
 
 def test_only_bodies_use_energy():

@@ -81,14 +81,21 @@ def test_view_flies_quadrotors_until_the_window_is_closed(opened, here):
     swarm = Swarm(mission, [1])
     flown = rollout(swarm, make_policy("planner", mission))
     flown_m = [swarm.states.position_m[0] for _ in flown]
-    # Three windows of five pictures a mission, which lead from the first one's end to the last's.
-    np.testing.assert_allclose(pictures_m[4:15:5], flown_m[1:], atol=1e-9)
+    # A picture of the first window's end, and three windows of five pictures to the last one's.
+    np.testing.assert_allclose(pictures_m[0:16:5], flown_m, atol=1e-9)
     third_m = 0.4 * flown_m[0] + 0.6 * flown_m[1]
-    np.testing.assert_allclose(pictures_m[2], third_m, atol=1e-9)
-    np.testing.assert_allclose(pictures_m[19], pictures_m[4], atol=1e-9)
+    np.testing.assert_allclose(pictures_m[3], third_m, atol=1e-9)
+    np.testing.assert_allclose(pictures_m[21], pictures_m[5], atol=1e-9)
     assert window.cam.type == mujoco.mjtCamera.mjCAMERA_TRACKING
     assert window.model.body(window.cam.trackbodyid).name == "r0/body"
     assert list(here.iterdir()) == []
+
+
+def test_view_shows_a_mission_of_one_window(opened):
+    assert main(["scene", "--view", "--robots", "3", "--windows", "1", "--range-ratio", "2"]) == 0
+    (window,) = opened
+    assert len(window.shown_m) == 34
+    assert np.ptp(window.shown_m, axis=0).max() == 0.0
 
 
 def test_view_shows_points_on_their_map(opened):
