@@ -111,6 +111,11 @@ class Bodies(Team):
         return self.robot != POINT
 
     @property
+    def has_wind(self) -> bool:
+        """True if a wind pushes the robots, which must have bodies."""
+        return self.has_bodies and (self.wind_mps > 0.0 or self.gust_mps > 0.0)
+
+    @property
     def num_axes(self) -> int:
         """D: axes of positions and velocities, 2 of points and 3 of bodies."""
         return SPACE if self.has_bodies else PLANE

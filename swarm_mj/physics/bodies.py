@@ -113,7 +113,7 @@ class BodyWorlds:
         self.obstacles = found if len(found.kind) > 0 else None
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         self._act = self._batch.bind("act")
-        self._wind = self._batch.expand("opt.wind") if _has_wind(mission) else None
+        self._wind = self._batch.expand("opt.wind") if mission.has_wind else None
         self._num_steps = num_body_steps(mission, kinds)
         self._step_s = mission.window_s / self._num_steps
         pilots = make_pilots(kinds, self._step_s, pilot)
@@ -349,8 +349,8 @@ class BodyWorlds:
                 if flown.kind.is_free:
                     _note_contacts(flown.push, flown.has_crashed)
                     _slow_tumbling(flown.has_crashed, flown.qvel)
-        self._change_gusts()
         self._take_states()
+        self._change_gusts()
         self._count_active()
         return self.states
 
@@ -385,6 +385,7 @@ class BodyWorlds:
             attitude=attitude,
             has_crashed=self._has_crashed.copy(),
             sensors=sensors,
+            wind_mps=None if self._wind is None else self._wind[:, :PLANE].copy(),
             energy_j=self._energy_j.copy(),
         )
 
@@ -432,10 +433,6 @@ def _check_bodies(model: MjModel, kinds: Sequence[RobotKind]) -> None:
             "a scene must leave the robots, but changed their mass or what collides of them, or "
             "tied them; add static geoms to the world instead"
         )
-
-
-def _has_wind(mission: Mission) -> bool:
-    return mission.wind_mps > 0.0 or mission.gust_mps > 0.0
 
 
 def _seen(array: np.ndarray) -> np.ndarray:

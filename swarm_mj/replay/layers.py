@@ -51,6 +51,7 @@ CUT_OFF = Points(path="arena/world/cut_off", colour=palette.CUT_OFF, width=12.0,
 TRANSMITTERS = Points(
     path="arena/radio/transmitter", colour=palette.BROADCAST, width=9.0, order=25.0
 )
+WIND = Arrows(path="arena/wind", colour=palette.HEADING, width=2.0, order=28.0)
 HEADINGS = Lines(path="arena/heading", colour=palette.HEADING, width=0.8, order=29.0)
 ROBOTS = Points(path="arena/robots", colour=None, width=5.5, order=30.0)
 EGO_NAME = Points(path="arena/ego/name", colour=palette.EGO, width=0.1, order=30.0)
@@ -76,6 +77,7 @@ SCENE_ROBOTS = SCENE.below("robots")
 SCENE_BODIES = View(path="scene/bodies")
 SCENE_CUT_OFF = SCENE.below("world/cut_off")
 SCENE_GRID = Lines3D(path="scene/grid", colour=palette.OUTLINE, width=0.5)
+SCENE_WIND = Lines3D(path="scene/wind", colour=palette.HEADING, width=2.0)
 SCENE_HEADINGS = Lines3D(path="scene/heading", colour=palette.HEADING, width=0.8)
 SCENE_UNBELIEVED = Lines3D(path="scene/world/unbelieved", colour=None, width=0.6)
 SCENE_TOO_WEAK = Lines3D(path="scene/world/too_weak", colour=None, width=0.5)
@@ -149,6 +151,8 @@ def legend(
     if log.has_motion:
         others.append(LegendSample("heading", HEADINGS))
         others.append(LegendSample(f"r{log.ego}'s belief", BELIEF, radius=0.8))
+    if log.facts.mission.has_wind:
+        others.append(LegendSample("wind", WIND))
     others.append(LegendSample(f"r{log.ego}'s tree", PARENTS))
     # Beyond free space, the circle is what the range would be.
     text = "range in\nfree space" if log.is_compared else "radio range"

@@ -55,15 +55,20 @@ class _Rows(NamedTuple):
 
 
 class _BodyRows(NamedTuple):
-    """The height and attitude of robots with bodies, likewise."""
+    """The height and attitude of robots with bodies, and the wind on them, likewise."""
 
     height_m: Float[np.ndarray, "R N"]
     attitude: Float[np.ndarray, "R N 4"]
+    wind_mps: Float[np.ndarray, "R 2"]
 
 
 def _room_for_bodies(num_windows: int, num_robots: int) -> _BodyRows:
     robots = (num_windows, num_robots)
-    return _BodyRows(height_m=np.empty(robots), attitude=np.empty((*robots, 4)))
+    return _BodyRows(
+        height_m=np.empty(robots),
+        attitude=np.empty((*robots, 4)),
+        wind_mps=np.zeros((num_windows, PLANE)),
+    )
 
 
 def _room(num_windows: int, num_robots: int) -> _Rows:
@@ -175,6 +180,8 @@ class Recorder:
         if self._body_rows is not None and states.attitude is not None:
             self._body_rows.height_m[row] = states.position_m[index, :, PLANE]
             self._body_rows.attitude[row] = states.attitude[index]
+            if states.wind_mps is not None:
+                self._body_rows.wind_mps[row] = states.wind_mps[index]
         rows.is_on[row] = self._all_on if states.is_active is None else states.is_active[index]
         rows.believed_m[row] = buffers.position_m[index, self._ego, :, :PLANE]
         rows.parent[row] = buffers.parent[index, self._ego]
@@ -244,9 +251,9 @@ class Recorder:
     def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
         """Return the windows from a row on, up to another."""
         flown = _Rows(*(array[first:after] for array in self._rows))
-        height_m = attitude = None
+        height_m = attitude = wind_mps = None
         if self._body_rows is not None:
-            height_m, attitude = (array[first:after] for array in self._body_rows)
+            height_m, attitude, wind_mps = (array[first:after] for array in self._body_rows)
         lead = slice(max(0, first - LEAD_WINDOWS), first)
         compared = self._compared(flown.is_on, first)
         window = np.arange(first + 1, after + 1)
@@ -277,6 +284,7 @@ class Recorder:
             task_cost=replace(costs[0], value=value) if costs else None,
             height_m=height_m,
             attitude=attitude,
+            wind_mps=wind_mps if facts.mission.has_wind else None,
             **flown._asdict(),
             **compared._asdict(),
         )

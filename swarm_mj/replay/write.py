@@ -41,6 +41,9 @@ TRAIL_STRIDE = 15
 TRAIL_EVERY = 5  # windows; in between, the last one is shown
 HEADING_SHARE = 0.06  # a heading's length, of half the map's width
 RING_SHARE = 0.014  # the radius of a ring around a believed position, likewise
+WIND_SHARE = 0.15  # the length of the arrow of a strong wind, likewise
+WIND_PLACE = 0.9  # where it begins, from the middle to the corner in the north-west
+STRONG_GUST = 2.0  # standard deviations of a gust, on top of the mean
 ASIDE_SHARE = 0.8 * RING_SHARE  # from a request to its answer, likewise
 RADIUS_SHARE = 1.4 * RING_SHARE  # of a body in 3-D, likewise
 ON_BODY = 0.5  # of a disc's width, where it is on a body that it must not hide
@@ -173,6 +176,7 @@ def draw_team(out: RerunLog) -> None:
     _draw_discs(out, radius_m, height_m)
     if log.attitude is not None:
         draw_bodies(out, radius_m)
+    _draw_wind(out)
     if log.has_motion:
         _draw_motion(out, height_m)
         _draw_trails(out)
@@ -241,6 +245,21 @@ def _draw_motion(out: RerunLog, height_m: float) -> None:
     above_m = log.above(height_m)
     raised_m = [lifted(end, above_m).reshape(-1, 3) for end in (start_m, end_m)]
     out.lines(layers.SCENE_HEADINGS, *raised_m)
+
+
+def _draw_wind(out: RerunLog) -> None:
+    """Draw the wind of each window, if any blows, as an arrow in a corner; on the floor in 3-D."""
+    wind_mps = out.log.wind_mps
+    if wind_mps is None:
+        return
+    mission = out.log.facts.mission
+    strong_mps = mission.wind_mps + STRONG_GUST * mission.gust_mps
+    vectors_m = WIND_SHARE * out.unit_m * wind_mps / strong_mps
+    start_m = out.log.ground.centre_m + WIND_PLACE * np.array([-out.unit_m, out.unit_m])
+    row = np.arange(len(vectors_m))
+    out.arrows(layers.WIND, start_m, vectors_m, row)
+    end_m = start_m + vectors_m
+    out.lines(layers.SCENE_WIND, lifted(start_m, 0.0), lifted(end_m, 0.0), row)
 
 
 def _draw_trails(out: RerunLog) -> None:

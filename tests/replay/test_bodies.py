@@ -1,8 +1,15 @@
 import numpy as np
 import pytest
+from reading import entities, rows
 
 import swarm_mj
+from swarm_mj import make_policy, paper
+from swarm_mj.replay import layers
 from swarm_mj.replay.read import read_footage
+from swarm_mj.replay.recorder import Recorder
+from swarm_mj.replay.write import write_replay
+from swarm_mj.simulation.rollout import rollout
+from swarm_mj.simulation.swarm import Swarm
 
 
 @pytest.fixture(scope="module")
@@ -45,3 +52,29 @@ def test_points_have_neither(tmp_path):
     footage = read_footage(path)
     assert footage.height_m is None
     assert footage.attitude is None
+
+
+def test_a_wind_is_an_arrow_as_long_as_it_is_strong(tmp_path):
+    """A mean of 6 m/s to the east, and gusts of 2 m/s: strong is 10 m/s, 0.15 of half the map."""
+    how = {"robot": "quadrotor", "num_robots": 3, "num_windows": 6, "range_ratio": 2.0}
+    swarm = Swarm(paper("random-walk", wind_mps=6.0, gust_mps=2.0, **how), [1])
+    recorder = Recorder(swarm)
+    flown_mps = []
+    for window in rollout(swarm, make_policy("tdma", swarm.mission)):
+        recorder.add(window)
+        flown_mps.append(swarm.states.wind_mps[0])
+    log = recorder.log()
+    np.testing.assert_array_equal(log.wind_mps, flown_mps)
+    assert np.ptp(log.wind_mps[:, 0]) > 0.1
+    assert np.mean(log.wind_mps[:, 0]) > 2.0
+    path = tmp_path / "windy.rrd"
+    write_replay(log, {"seed": 1}, path)
+    vectors_m = rows(path, f"/{layers.WIND.path}", "Arrows2D:vectors", 2)
+    expected_m = 0.15 * swarm.mission.half_side_m / 10.0 * log.wind_mps
+    np.testing.assert_allclose(vectors_m, expected_m, rtol=1e-5)
+
+
+def test_in_calm_there_is_no_arrow(replay):
+    run, path = replay
+    assert not run.mission.has_wind
+    assert f"/{layers.WIND.path}" not in entities(path)

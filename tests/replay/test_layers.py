@@ -24,6 +24,7 @@ DRAWN = (
     "scene/grid",
     "scene/heading",
     "scene/packets",
+    "scene/wind",
     "scene/world",
 )
 
@@ -40,14 +41,19 @@ def declared(kind):
 
 
 @pytest.fixture(scope="module")
-def written(replay, flood_replay, blocked_replay, two_way, tmp_path_factory):
-    """The replays of missions that differ in what they have: the last one has no walls."""
+def written(replay, flood_replay, blocked_replay, two_way, high, tmp_path_factory):
+    """The replays of missions that differ in what they have: one has a wind, and one no walls."""
     facts = two_way.log.facts
     facts = replace(facts, mission=replace(facts.mission, boundary="none"))
     path = tmp_path_factory.mktemp("open") / "free.rrd"
     variance = np.linspace(1.0, 0.0, len(two_way.log.window))  # it agrees in the end
     log = replace(two_way.log, facts=facts, velocity_variance_m2ps2=variance)
     write_replay(log, {"seed": 5}, path)
+    windy = path.with_name("windy.rrd")
+    mission = replace(high.log.facts.mission, wind_mps=4.0)
+    wind_mps = np.full((len(high.log.window), 2), 4.0)
+    facts = replace(high.log.facts, mission=mission)
+    write_replay(replace(high.log, facts=facts, wind_mps=wind_mps), {"seed": 5}, windy)
     training = path.with_name("training.rrd")
     curve = TrainingCurve(
         title="cost",
@@ -62,7 +68,7 @@ def written(replay, flood_replay, blocked_replay, two_way, tmp_path_factory):
         out = RerunLog([recording], two_way.log)
         draw_training_curve(out, curve)
         send_layout(recording, out, is_live=True, curve=curve)
-    return replay, flood_replay, blocked_replay, path, training
+    return replay, flood_replay, blocked_replay, path, windy, training
 
 
 @pytest.fixture(scope="module")
