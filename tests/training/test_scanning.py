@@ -73,6 +73,7 @@ def test_it_approaches_no_faster_than_the_distance_allows(range_m, along_mps):
     np.testing.assert_allclose(slow_mps, [[[along_mps, 2.0]]])
 
 
+@pytest.mark.slow
 def test_it_keeps_off_a_tree_that_others_hit():
     """Straight at the first tree, of a radius of 6 m in the middle of x, from 20 m at 3 m/s."""
     tree_m = np.array([0.0, -1000.0 / 6.0])
