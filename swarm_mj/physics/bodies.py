@@ -68,6 +68,7 @@ class _Flown(NamedTuple):
     has_crashed: Bool[np.ndarray, "B n"]
     energy_j: Float[np.ndarray, "B n"]
     motors: Motors | None  # None: the model does not say what they use
+    pushes: Float[np.ndarray, "U 3"]  # of each motor's force on the robot, by its weight [1/N]
     is_trusted: bool  # the pilot is the package's own
     free: Sensed | None  # views of a free base's states; None: its base is on a plane
 
@@ -169,7 +170,10 @@ class BodyWorlds:
                 ),
                 has_crashed=self._has_crashed[:, robots],
                 energy_j=self._energy_j[:, robots],
-                motors=motors_of(kind.lifts, kind.declared, self._step_s, AIR_DENSITY),
+                motors=motors_of(
+                    np.linalg.norm(kind.pushes, axis=1), kind.declared, self._step_s, AIR_DENSITY
+                ),
+                pushes=kind.pushes / kind.weight_n,
                 is_trusted=is_ours(pilot),
                 free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )
@@ -371,8 +375,10 @@ class BodyWorlds:
         attitude = np.empty((*shape, 4))
         # A robot with fewer sensors than others has zeros behind its own.
         sensors = np.zeros((*shape, self._num_sensed)) if self._num_sensed > 0 else None
+        thrust = np.empty((*shape, 3))
         for flown in self._flown:
             sensed = _sensed(flown)
+            thrust[:, flown.robots] = flown.force_n @ flown.pushes
             if sensors is not None:
                 sensors[:, flown.robots, : sensed.sensors.shape[2]] = sensed.sensors
             position_m[:, flown.robots] = sensed.position_m
@@ -385,6 +391,7 @@ class BodyWorlds:
             attitude=attitude,
             has_crashed=self._has_crashed.copy(),
             sensors=sensors,
+            thrust=thrust,
             wind_mps=None if self._wind is None else self._wind[:, :PLANE].copy(),
             energy_j=self._energy_j.copy(),
         )

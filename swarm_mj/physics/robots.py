@@ -120,9 +120,14 @@ class RobotKind:
         return self.model.actuator_biastype == mjtBias.mjBIAS_NONE
 
     @property
-    def lifts(self) -> Float[np.ndarray, "U"]:
-        """How hard each motor pushes the base, by its force before gears."""
-        return np.linalg.norm(self._effects()[:, :3], axis=1)
+    def pushes(self) -> Float[np.ndarray, "U 3"]:
+        """How each motor pushes the base, in its axes, by its force before gears."""
+        return self._effects()[:, :3]
+
+    @property
+    def weight_n(self) -> float:
+        """The whole robot's weight [N]."""
+        return float(self.model.body_subtreemass[1]) * GRAVITY_MPS2
 
     def _effects(self) -> Float[np.ndarray, "U 6"]:
         """Return the force and torque on the base, in its axes, by each motor's own force."""

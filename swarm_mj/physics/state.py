@@ -26,6 +26,8 @@ class RobotStates:
     observed_m: Float[np.ndarray, "B N D"] | None = None  # own position, with its error [m]
     # Of the models' sensors, in MuJoCo's units; `physics.robots.sensor_columns` has their names.
     sensors: Float[np.ndarray, "B N S"] | None = None  # None: no robot has any
+    # Of all its motors on a body, by its weight and in its own axes [1]; None: points.
+    thrust: Float[np.ndarray, "B N 3"] | None = None
     wind_mps: Float[np.ndarray, "B 2"] | None = None  # on bodies, in the last window; None: calm
     # What bodies have used so far, nan where their models do not say [J]; None: points.
     energy_j: Float[np.ndarray, "B N"] | None = None

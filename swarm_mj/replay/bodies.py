@@ -1,5 +1,7 @@
 """The bodies of a replay: each robot's own geoms, where it is and as it is turned, in 3-D.
 
+A line is the thrust of its motors: straight up, and as long as its weight, while one hovers.
+
 They are drawn as large as the discs that stand for points: true to scale, none could be seen in an
 area of a square kilometre.
 """
@@ -8,6 +10,7 @@ from collections.abc import Iterable
 
 import numpy as np
 import rerun as rr
+from jaxtyping import Float
 from mujoco._structs import MjModel
 
 from swarm_mj.physics.robots import RobotKind, kinds_of, rest_pose
@@ -17,6 +20,7 @@ from swarm_mj.replay.rerun_log import RerunLog
 from swarm_mj.replay.stage import drawn_geom
 
 LARGER = 1.6  # than a disc: a body is seen around the colour of its age
+THRUST_RADII = 4.0  # length of a thrust as large as the weight, by a disc's radius
 HIDDEN_GROUP = 3  # of geoms that only collide, by MuJoCo's custom
 
 
@@ -44,6 +48,18 @@ def draw_bodies(out: RerunLog, radius_m: float) -> None:
                 scale=np.full((len(place_m), 3), scale),
             )
             out.timed(body_of(i), columns)
+    if log.thrust is not None:
+        end_m = place_m + THRUST_RADII * radius_m * rotated(log.thrust, log.attitude)
+        out.lines(layers.SCENE_THRUST, place_m.reshape(-1, 3), end_m.reshape(-1, 3))
+
+
+def rotated(
+    vector: Float[np.ndarray, "T N 3"], attitude: Float[np.ndarray, "T N 4"]
+) -> Float[np.ndarray, "T N 3"]:
+    """Return vectors of robots' own axes in those of the world."""
+    real, imaginary = attitude[..., :1], attitude[..., 1:]
+    turned = np.cross(imaginary, vector)
+    return vector + 2.0 * (real * turned + np.cross(imaginary, turned))
 
 
 def _geoms(kind: RobotKind) -> dict[str, rr.AsComponents]:

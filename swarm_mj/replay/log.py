@@ -40,6 +40,8 @@ class Log(Footage):
     age_std: Float[np.ndarray, "T"]  # over all pairs of different robots that are on [windows]
     age_max: Float[np.ndarray, "T"]  # the worst pair's [windows]
     velocity_variance_m2ps2: Float[np.ndarray, "T"]
+    # Of bodies' motors, by their weight and in their own axes [1]; None: points.
+    thrust: Float[np.ndarray, "T N 3"] | None = None
     wind_mps: Float[np.ndarray, "T 2"] | None = None  # None: calm
     task_cost: TaskCost | None = None  # one value a window; None if the controller has none
     num_believed: Int[np.ndarray, "C"]  # links that policies believe in, in each snapshot

@@ -43,6 +43,7 @@ EGO: Colour = (255, 255, 255)
 UNKNOWN: Colour = (84, 86, 94)
 SWITCHED_OFF: Colour = (46, 48, 54)
 HEADING: Colour = (205, 210, 220)
+THRUST: Colour = (240, 200, 80)  # of bodies, in 3-D
 TRAIL: Colour = (50, 60, 76)
 TREE: Colour = (78, 90, 112)
 BELIEF: Colour = (104, 118, 144)

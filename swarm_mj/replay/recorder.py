@@ -55,10 +55,11 @@ class _Rows(NamedTuple):
 
 
 class _BodyRows(NamedTuple):
-    """The height and attitude of robots with bodies, and the wind on them, likewise."""
+    """What is more of robots with bodies, likewise."""
 
     height_m: Float[np.ndarray, "R N"]
     attitude: Float[np.ndarray, "R N 4"]
+    thrust: Float[np.ndarray, "R N 3"]
     wind_mps: Float[np.ndarray, "R 2"]
 
 
@@ -67,6 +68,7 @@ def _room_for_bodies(num_windows: int, num_robots: int) -> _BodyRows:
     return _BodyRows(
         height_m=np.empty(robots),
         attitude=np.empty((*robots, 4)),
+        thrust=np.zeros((*robots, 3)),
         wind_mps=np.zeros((num_windows, PLANE)),
     )
 
@@ -180,6 +182,8 @@ class Recorder:
         if self._body_rows is not None and states.attitude is not None:
             self._body_rows.height_m[row] = states.position_m[index, :, PLANE]
             self._body_rows.attitude[row] = states.attitude[index]
+            if states.thrust is not None:
+                self._body_rows.thrust[row] = states.thrust[index]
             if states.wind_mps is not None:
                 self._body_rows.wind_mps[row] = states.wind_mps[index]
         rows.is_on[row] = self._all_on if states.is_active is None else states.is_active[index]
@@ -251,9 +255,9 @@ class Recorder:
     def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
         """Return the windows from a row on, up to another."""
         flown = _Rows(*(array[first:after] for array in self._rows))
-        height_m = attitude = wind_mps = None
+        height_m = attitude = thrust = wind_mps = None
         if self._body_rows is not None:
-            height_m, attitude, wind_mps = (array[first:after] for array in self._body_rows)
+            height_m, attitude, thrust, wind_mps = (array[first:after] for array in self._body_rows)
         lead = slice(max(0, first - LEAD_WINDOWS), first)
         compared = self._compared(flown.is_on, first)
         window = np.arange(first + 1, after + 1)
@@ -284,6 +288,7 @@ class Recorder:
             task_cost=replace(costs[0], value=value) if costs else None,
             height_m=height_m,
             attitude=attitude,
+            thrust=thrust,
             wind_mps=wind_mps if facts.mission.has_wind else None,
             **flown._asdict(),
             **compared._asdict(),

@@ -47,5 +47,5 @@ IN_MEMORY = ReplaySize(
     base=0.16 * GB, window=15e3, robot=750.0, matrix=3.3, bodies=22e6, body=0.42e6, pose=0.0
 )
 ON_DISK = ReplaySize(
-    base=0.5e6, window=800.0, robot=110.0, matrix=0.04, bodies=0.0, body=38e3, pose=52.0
+    base=0.5e6, window=800.0, robot=110.0, matrix=0.04, bodies=0.0, body=38e3, pose=85.0
 )

@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from reading import entities, rows
@@ -5,9 +7,10 @@ from reading import entities, rows
 import swarm_mj
 from swarm_mj import make_policy, paper
 from swarm_mj.replay import layers
+from swarm_mj.replay.bodies import rotated
 from swarm_mj.replay.read import read_footage
 from swarm_mj.replay.recorder import Recorder
-from swarm_mj.replay.write import write_replay
+from swarm_mj.replay.write import RADIUS_SHARE, write_replay
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
@@ -78,3 +81,29 @@ def test_in_calm_there_is_no_arrow(replay):
     run, path = replay
     assert not run.mission.has_wind
     assert f"/{layers.WIND.path}" not in entities(path)
+
+
+def test_thrust_is_a_line_as_long_as_the_weight_of_what_hovers(tmp_path):
+    """Straight up by 4 radii of a disc; the rover at rest pushes nowhere."""
+    mission = paper("stationary", robot="quadrotor:2,rover:1", num_robots=3, range_ratio=2.0)
+    swarm = Swarm(replace(mission, num_windows=4), [1])
+    recorder = Recorder(swarm)
+    for window in rollout(swarm, make_policy("tdma", swarm.mission)):
+        recorder.add(window)
+    path = tmp_path / "hovering.rrd"
+    write_replay(recorder.log(), {"seed": 1}, path)
+    lines_m = rows(path, f"/{layers.SCENE_THRUST.path}", "LineStrips3D:strips", 3, 2, 3)
+    way_m = lines_m[:, :, 1] - lines_m[:, :, 0]
+    np.testing.assert_allclose(way_m[..., :2], 0.0, atol=1e-3)
+    length_m = 4.0 * RADIUS_SHARE * mission.half_side_m
+    np.testing.assert_allclose(way_m[..., 2], [[length_m, length_m, 0.0]] * 4, rtol=1e-3, atol=1e-3)
+
+
+def test_thrust_turns_with_its_robot():
+    """Rolled by 90 degrees about x, what pushed up pushes to the right, which is -y."""
+    half = np.sqrt(0.5)
+    attitude = np.array([[[half, half, 0.0, 0.0], [1.0, 0.0, 0.0, 0.0]]])
+    up = np.array([[[0.0, 0.0, 1.0], [0.3, 0.0, 2.0]]])
+    np.testing.assert_allclose(
+        rotated(up, attitude)[0], [[0.0, -1.0, 0.0], [0.3, 0.0, 2.0]], atol=1e-12
+    )

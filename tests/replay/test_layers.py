@@ -24,6 +24,7 @@ DRAWN = (
     "scene/grid",
     "scene/heading",
     "scene/packets",
+    "scene/thrust",
     "scene/wind",
     "scene/world",
 )
