@@ -55,7 +55,7 @@ class _Rows(NamedTuple):
 
 
 class _BodyRows(NamedTuple):
-    """What is more of robots with bodies, likewise."""
+    """The same of robots with bodies: what points do not have."""
 
     height_m: Float[np.ndarray, "R N"]
     attitude: Float[np.ndarray, "R N 4"]
