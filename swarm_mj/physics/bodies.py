@@ -24,7 +24,7 @@ from swarm_mj.mission.faults import MIN_SURVIVORS
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.energy import Motors, motors_of, use_energy
 from swarm_mj.physics.obstacles import obstacles_of
-from swarm_mj.physics.pilots import Pilot, Sensed, SetPoint
+from swarm_mj.physics.pilots import GRAVITY_MPS2, Pilot, Sensed, SetPoint
 from swarm_mj.physics.robots import (
     FREE_QPOS,
     FREE_QVEL,
@@ -149,6 +149,7 @@ class BodyWorlds:
         found = []
         for kind, pilot in zip(kinds, pilots, strict=True):
             model = kind.model
+            pushes = kind.pushes
             qpos = part("qpos", kind, model.nq)
             qvel = part("qvel", kind, model.nv)
             sensors = part("sensordata", kind, model.nsensordata)
@@ -171,9 +172,9 @@ class BodyWorlds:
                 has_crashed=self._has_crashed[:, robots],
                 energy_j=self._energy_j[:, robots],
                 motors=motors_of(
-                    np.linalg.norm(kind.pushes, axis=1), kind.declared, self._step_s, AIR_DENSITY
+                    np.linalg.norm(pushes, axis=1), kind.declared, self._step_s, AIR_DENSITY
                 ),
-                pushes=kind.pushes / kind.weight_n,
+                pushes=pushes / (kind.mass_kg * GRAVITY_MPS2),
                 is_trusted=is_ours(pilot),
                 free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )

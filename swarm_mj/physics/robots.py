@@ -125,9 +125,9 @@ class RobotKind:
         return self._effects()[:, :3]
 
     @property
-    def weight_n(self) -> float:
-        """The whole robot's weight [N]."""
-        return float(self.model.body_subtreemass[1]) * GRAVITY_MPS2
+    def mass_kg(self) -> float:
+        """The whole robot's mass."""
+        return float(self.model.body_subtreemass[1])
 
     def _effects(self) -> Float[np.ndarray, "U 6"]:
         """Return the force and torque on the base, in its axes, by each motor's own force."""
@@ -159,7 +159,7 @@ class RobotKind:
         is_limited = model.actuator_ctrllimited.astype(bool)
         least, most = model.actuator_ctrlrange.T
         return Airframe(
-            mass_kg=float(model.body_subtreemass[1]),
+            mass_kg=self.mass_kg,
             inertia_kgm2=self._inertia_kgm2(),
             actuators=tuple(model.actuator(u).name for u in range(model.nu)),
             least=np.where(is_limited, least, -np.inf),
