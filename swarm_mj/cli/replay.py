@@ -65,7 +65,7 @@ class ReplayOptions:
         None, "pictures per second, of a GIF 50 at most", low=1, high=60, shown="25; GIF: 15"
     )
     theme: str = _video("dark", "colours of the frame and the ground", choices=tuple(THEMES))
-    camera: view.Camera = setting(
+    camera: str = setting(
         view.MAP,
         "where it is seen from: above, or by one that flies behind the observer",
         choices=view.CAMERAS,

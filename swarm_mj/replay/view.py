@@ -9,7 +9,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal, NamedTuple, get_args
+from typing import TYPE_CHECKING, NamedTuple
 
 from swarm_mj.system.interrupt import answer_interrupt
 from swarm_mj.system.processes import PYTHON, running
@@ -147,10 +147,9 @@ def free_ports(number: int) -> list[int]:
 
 
 # Where a video is seen from.
-Camera = Literal["map", "chase"]
-MAP: Camera = "map"
-CHASE: Camera = "chase"
-CAMERAS: tuple[Camera, ...] = get_args(Camera)
+MAP = "map"
+CHASE = "chase"
+CAMERAS = (MAP, CHASE)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -162,7 +161,7 @@ class VideoStyle:
     seconds: float = LONGEST_S  # in which the whole mission is shown
     fps: int | float = 25  # pictures per second
     theme: str = "dark"  # a name of `rendering.theme.THEMES`
-    camera: Camera = MAP
+    camera: str = MAP  # one of CAMERAS
 
     def __post_init__(self) -> None:
         if self.camera not in CAMERAS:

@@ -26,7 +26,7 @@ from swarm_mj.replay.palette import Colour
 from swarm_mj.replay.rendering import markers
 from swarm_mj.replay.rendering.opengl import make_context, unusable
 from swarm_mj.replay.rendering.theme import DARK, Theme
-from swarm_mj.replay.view import CHASE, MAP, Camera
+from swarm_mj.replay.view import CHASE, MAP
 
 BEACONS = 2  # the group of the robots' own markers, assets/robot.xml: too small from afar
 TILE_M = 200.0  # the floor's texture, two squares by two, assets/arena.xml
@@ -63,7 +63,7 @@ class SceneRenderer(ExitStack):
         *,
         scene: Scene | None = None,
         theme: Theme = DARK,
-        camera: Camera = MAP,
+        camera: str = MAP,
     ) -> None:
         """Compile the scene for pictures of this size [pixels] by a camera of `CAMERAS`.
 
@@ -235,9 +235,7 @@ def _shares(colour: Colour) -> list[float]:
 class SceneViewer:
     """MuJoCo's passive viewer, with robots and packets; to close the window ends the view alone."""
 
-    def __init__(
-        self, mission: Mission, *, scene: Scene | None = None, camera: Camera = MAP
-    ) -> None:
+    def __init__(self, mission: Mission, *, scene: Scene | None = None, camera: str = MAP) -> None:
         """Open the window; raise OSError without a display, or if it is closed already.
 
         It is first seen by a camera of `CAMERAS`. One that chases stays with its robot, while the
