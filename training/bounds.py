@@ -268,7 +268,7 @@ class Settings:
     """Which teams get a floor."""
 
     teams: int = setting(20, "of each range ratio", low=1, high=1000)
-    seed: int = setting(2000, "of the first mission")
+    seed: int = setting(4500, "of the first mission")
     robots: int = setting(40, "in a team", low=2, high=100)
     seconds: float = setting(2.0, "for the search of each team", low=0.1, high=1e4)
     out: Path = setting(
