@@ -24,7 +24,7 @@ from swarm_mj.physics.arena_files import read_mjcf, refused, take_over_settings
 from swarm_mj.physics.declarations import Declarations, declared_by
 from swarm_mj.physics.pilots import GRAVITY_MPS2, Airframe, Pilot, QuadrotorPilot, RoverPilot
 from swarm_mj.physics.state import Antennas
-from swarm_mj.system.arguments import check_callable, did_you_mean
+from swarm_mj.system.arguments import check_component, did_you_mean
 from swarm_mj.system.decibels import from_db
 from swarm_mj.system.packages import asset
 from swarm_mj.system.user_code import make
@@ -319,7 +319,7 @@ def _own_pilot(own: OwnPilot, airframe: Airframe) -> Pilot:
         made = make("pilot", own, airframe)
     elif isinstance(own, type):
         made = own(airframe)
-    check_callable("pilot", made, CALLED_WITH)
+    check_component("pilot", made, CALLED_WITH)
     return made
 
 

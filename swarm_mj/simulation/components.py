@@ -15,7 +15,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.gain_table import GainTable
-from swarm_mj.system.arguments import check_callable, name_of
+from swarm_mj.system.arguments import check_component, name_of
 from swarm_mj.system.fields import setting
 from swarm_mj.system.user_code import call, file_of, files_named, make
 
@@ -85,7 +85,7 @@ class Components:
             # A channel that varies from slot to slot is asked for each slot's, not called.
             is_class = kind == "pilot" and isinstance(component, type)  # made for its robots
             if not isinstance(component, str) and not hasattr(component, "at") and not is_class:
-                check_callable(kind, component, CALLED_WITH[kind])
+                check_component(kind, component, CALLED_WITH[kind])
 
     @property
     def given(self) -> GivenParts:
@@ -143,7 +143,7 @@ class Components:
             try:
                 part = _made(kind, name, mission)
                 if part is None or isinstance(part, str):  # which else stand for what is not made
-                    check_callable(kind, part, CALLED_WITH[kind])
+                    check_component(kind, part, CALLED_WITH[kind])
                 made = replace(made, **{kind: part})
             except TypeError as error:
                 raise ValueError(f"{kind} {name}: {error}") from error

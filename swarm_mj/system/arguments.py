@@ -93,6 +93,17 @@ def check_callable(what: str, value: object, takes: tuple[str, ...]) -> None:
         raise TypeError(f"{rule}, but this one takes {signature}") from error
 
 
+def check_component(what: str, value: object, takes: tuple[str, ...]) -> None:
+    """Raise TypeError unless a part of a mission can be called so, and started if it has `start`.
+
+    `mission.batched_rng.Started` says what `start` is for.
+    """
+    check_callable(what, value, takes)
+    start = getattr(value, "start", None)
+    if start is not None:
+        check_callable(f"{what}'s start", start, ("num_robots", "rngs"))
+
+
 def _shown(value: object) -> str:
     """Return a wrong argument, and what to do about a class in place of its object."""
     if isinstance(value, type):
