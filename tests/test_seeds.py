@@ -20,9 +20,8 @@ STUDIES = sorted(ROOT.glob("training/studies/*.toml")) + sorted(ROOT.glob("asset
 RESULTS = sorted((ROOT / "training/results").rglob("*.csv"))
 TUNING = {"training/results/classics-tuning.csv"}  # no result: it says what was chosen
 
-# Results and studies with missions that chose something. No file may join them, and what is mended
-# leaves them. The reason is the same for all: tables are flown anew for version 1.1.0, by studies of
-# which none is here.
+# Results with missions that chose something. No file may join them, and what is mended leaves them.
+# The reason is the same for all: tables are flown anew for version 1.1.0, by other studies.
 DEBTS = {
     "training/results/bit-rates.csv",
     "training/results/ceiling.csv",
