@@ -25,7 +25,7 @@ in Robot Teams. Where its text and its authors' code differ, see `mission.paper`
     III-C           decisions                policies.gnn.decisions.recipient_logits
     III-C           PPO                      learning.ppo.make_model
     III-C           the training loop        learning.train.TrainingSession.learn
-    IV-A    Eq. 15  dynamics                 physics.worlds.Physics.step
+    IV-A    Eq. 15  dynamics                 physics.worlds.PointWorlds.step
     IV-A    Eq. 16  flocking control         control.motion.flocking
     IV-A    Eq. 17  velocity variance        protocol.costs.velocity_variance
     IV-A    Fig. 2  a flock that agrees      evaluation.figures.flock.draw_flock

@@ -10,7 +10,7 @@ from swarm_mj.control.motion import flocking
 from swarm_mj.mission import paper, reference
 from swarm_mj.mission.geometry import spanning_tree
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.physics.worlds import Physics
+from swarm_mj.physics.worlds import PointWorlds
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.protocol.costs import mean_hops, window_costs
 from swarm_mj.protocol.window import window
@@ -83,7 +83,7 @@ def test_renaming_the_robots_renames_their_motion(physics):
     position_m = rng.uniform(-200.0, 200.0, (1, NUM_ROBOTS, 2))
     velocity_mps = rng.uniform(-20.0, 20.0, (1, NUM_ROBOTS, 2))
     name = rng.permutation(NUM_ROBOTS)
-    one, other = Physics(mission, 1), Physics(mission, 1)
+    one, other = PointWorlds(mission, 1), PointWorlds(mission, 1)
     one.place(position_m, velocity_mps)
     other.place(position_m[:, name], velocity_mps[:, name])
     for _ in range(100):

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper
-from swarm_mj.physics.worlds import Physics
+from swarm_mj.physics.worlds import PointWorlds
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.random_access import RandomFlooding
 from swarm_mj.protocol.buffers import empty_buffers
@@ -50,7 +50,7 @@ def test_addressees_that_do_not_exist_are_refused(robot, monkeypatch):
 
 @pytest.mark.parametrize("physics", ["exact", "contact"])
 def test_accelerations_must_be_one_vector_per_robot(physics):
-    worlds = Physics(small(physics=physics), 2)
+    worlds = PointWorlds(small(physics=physics), 2)
     with pytest.raises(ValueError, match=r"acceleration must have shape \(2, 5, 2\)"):
         worlds.step(np.zeros((1, 5, 2)))
 
@@ -111,7 +111,7 @@ def test_the_mirror_folds_as_often_as_needed(velocity_ratio):
     )
     half = mission.half_side_m
     speed = mission.max_velocity_mps
-    worlds = Physics(mission, 1)
+    worlds = PointWorlds(mission, 1)
     worlds.place(np.zeros((1, 2, 2)), np.full((1, 2, 2), speed))
     states = worlds.step(np.zeros((1, 2, 2)))
     phase = (speed * 10.0 + half) % (4.0 * half)
@@ -124,7 +124,7 @@ def test_the_mirror_folds_as_often_as_needed(velocity_ratio):
 def test_fast_robots_leave_the_area_by_no_more_than_their_radius(velocity_ratio, window_s):
     mission = small(physics="contact", velocity_ratio=velocity_ratio, window_s=window_s)
     rng = np.random.default_rng(0)
-    worlds = Physics(mission, 4)
+    worlds = PointWorlds(mission, 4)
     limit, speed = mission.half_side_m, mission.max_velocity_mps
     worlds.place(rng.uniform(-limit, limit, (4, 5, 2)), rng.choice([-speed, speed], size=(4, 5, 2)))
     worst = 0.0

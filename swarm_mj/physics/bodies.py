@@ -74,13 +74,10 @@ class _Flown(NamedTuple):
 
 
 class BodyWorlds:
-    """B MuJoCo worlds of N robots with bodies.
+    """The `Worlds` of robots with bodies, D = 3.
 
-    Attributes:
-        states: Where the robots are [m], [B N 3], how fast [m/s], their attitude, who is active,
-            what their sensors measured, and the energy that they have used [J].
-        obstacles: What stands in the scene; None: nothing.
-        reach_m: How far from its base a robot collides, [N].
+    Their states also have attitudes, what sensors measured, who has crashed, and the energy that
+    each robot has used [J].
     """
 
     def __init__(

@@ -160,7 +160,7 @@ def compose(
     Args:
         mission: Whose arena it is.
         start: Where viewers see the robots, those of the first mission; also the keyframe `start`.
-            Without it, all robots stand at the origin until `Physics.place` moves them.
+            Without it, all robots stand at the origin until `Worlds.place` moves them.
         scene: What changes the arena with the robots in it. Its geoms stop robots in `contact`
             physics only, as `exact` has no collisions.
 

@@ -1,6 +1,9 @@
 """The robots' dynamics (IV-A): B worlds stepped side by side by MuJoCo, one window a call.
 
-Positions come from MuJoCo's step; only the mirror at a wall writes them. Two modes:
+`Worlds` is what a mission asks of them. Those of points are here, those of robots with bodies in
+`physics.bodies`.
+
+Positions of points come from MuJoCo's step; only the mirror at a wall writes them. Two modes:
 
 - `exact`: the paper's equation to rounding error. It moves p with the velocity before the kick,
   MuJoCo's Euler method with the velocity after it. So the servo's set point *is* v_t: one step of a
@@ -11,6 +14,7 @@ Positions come from MuJoCo's step; only the mirror at a wall writes them. Two mo
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,7 +22,7 @@ from mujoco import batch
 from mujoco._structs import MjModel  # private: type checkers see it only there
 
 from swarm_mj.mission import Mission
-from swarm_mj.physics.obstacles import obstacles_of
+from swarm_mj.physics.obstacles import Obstacles, obstacles_of
 from swarm_mj.physics.scene import (
     ROBOT_MASS_KG,
     Scene,
@@ -31,8 +35,51 @@ from swarm_mj.physics.state import ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.compiled import compiled
 
 
-class Physics:
-    """B MuJoCo worlds of N robots."""
+@runtime_checkable
+class Worlds(Protocol):
+    """B MuJoCo worlds of N robots, be they points or bodies.
+
+    Attributes:
+        states: Where the robots are [m], [B N D], how fast [m/s], and who is active, in arrays that
+            later steps do not change.
+        obstacles: What stands in the scene; None: nothing.
+        reach_m: How far from its middle a robot collides, [N].
+    """
+
+    states: RobotStates
+    obstacles: Obstacles | None
+    reach_m: Float[np.ndarray, "N"]
+
+    @property
+    def pose(self) -> tuple[Float[np.ndarray, "B Q"], Float[np.ndarray, "B V"]]:
+        """MuJoCo's coordinates of all worlds, and their rates, as they are now."""
+        ...
+
+    def start(self, rngs: Sequence[np.random.Generator]) -> None:
+        """Draw what is each mission's own, from its generator."""
+        ...
+
+    def draw_heights_m(self, rng: np.random.Generator) -> Float[np.ndarray, "N"] | None:
+        """Return how high the robots of a mission begin; None: they have no height."""
+        ...
+
+    def place(
+        self, position_m: Float[np.ndarray, "B N D"], velocity_mps: Float[np.ndarray, "B N D"]
+    ) -> None:
+        """Restart all worlds from p_0 [m] and v_0 [m/s]; robots that collide must be apart."""
+        ...
+
+    def deactivate(self, is_active: Bool[np.ndarray, "B N"]) -> None:
+        """Make these the active robots from now on."""
+        ...
+
+    def step(self, acceleration_mps2: Float[np.ndarray, "B N D"]) -> RobotStates:
+        """Move all robots one window on; ValueError for a u of another shape, or not finite."""
+        ...
+
+
+class PointWorlds:
+    """The `Worlds` of points."""
 
     def __init__(
         self,
@@ -73,7 +120,7 @@ class Physics:
     def start(self, rngs: Sequence[np.random.Generator]) -> None:
         """Draw nothing: points are all alike."""
 
-    def draw_heights_m(self, _rng: np.random.Generator) -> None:
+    def draw_heights_m(self, rng: np.random.Generator) -> None:
         """Return no heights, which points do not have."""
 
     def place(

@@ -9,9 +9,8 @@ from jaxtyping import Bool, Float
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.mission.placement import connected_positions
-from swarm_mj.physics.bodies import BodyWorlds
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
-from swarm_mj.physics.worlds import Physics
+from swarm_mj.physics.worlds import Worlds
 from swarm_mj.policies.policy import Policy, check_parameters
 from swarm_mj.protocol.packets import Packet
 from swarm_mj.radio.composed import ComposedChannel
@@ -26,7 +25,7 @@ class Starts:
     """Where the robots of missions may begin."""
 
     mission: Mission
-    worlds: Physics | BodyWorlds
+    worlds: Worlds
     channel: ComposedChannel | None  # that says who is connected; None: distances say it
 
     def positions(self, b: int, rng: np.random.Generator) -> Float[np.ndarray, "N D"]:

@@ -16,7 +16,7 @@ from swarm_mj.physics.bodies import BodyWorlds
 from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.physics.worlds import Physics
+from swarm_mj.physics.worlds import PointWorlds, Worlds
 from swarm_mj.policies.carrier_sense import SensingPolicy
 from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
@@ -47,11 +47,11 @@ def physics_of(
     scene: Scene | None,
     pilot: OwnPilot | None,
     num_threads: int,
-) -> Physics | BodyWorlds:
+) -> Worlds:
     """Return the worlds of a mission's robots, be they points or bodies."""
     if mission.has_bodies:
         return BodyWorlds(mission, num_missions, scene=scene, pilot=pilot, num_threads=num_threads)
-    return Physics(mission, num_missions, scene=scene, num_threads=num_threads)
+    return PointWorlds(mission, num_missions, scene=scene, num_threads=num_threads)
 
 
 class Swarm:

@@ -6,7 +6,7 @@ from mujoco import mjtEq, mjtGeom
 
 from swarm_mj.mission import paper, reference
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.physics.worlds import Physics
+from swarm_mj.physics.worlds import PointWorlds
 from swarm_mj.policies.tdma import Tdma
 from swarm_mj.simulation.swarm import Swarm
 
@@ -35,7 +35,7 @@ def drawn(mission, num_windows, seed=0, num_missions=NUM_MISSIONS):
 
 def placed(mission, position_m, velocity_mps, **options):
     """Worlds that begin so."""
-    worlds = Physics(mission, len(position_m), **options)
+    worlds = PointWorlds(mission, len(position_m), **options)
     worlds.place(position_m, velocity_mps)
     return worlds
 
@@ -251,7 +251,7 @@ def coupled(spec, _mission):
 @pytest.mark.parametrize("scene", [heavier, with_a_load, coupled])
 def test_a_scene_that_makes_robots_heavier_or_ties_them_is_refused(scene):
     with pytest.raises(ValueError, match=r"must leave how robots move.*mass=0"):
-        Physics(crowded(), 1, scene=scene)
+        PointWorlds(crowded(), 1, scene=scene)
 
 
 def test_a_scene_may_add_what_weighs_nothing_to_robots():

@@ -8,7 +8,7 @@ from walls import walls
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import ROBOT_RADIUS_M
-from swarm_mj.physics.worlds import Physics
+from swarm_mj.physics.worlds import PointWorlds
 from swarm_mj.policies.registry import make_policy
 from swarm_mj.simulation.starts import Starts, packet_by
 
@@ -16,7 +16,7 @@ MISSION = paper(num_robots=3)
 
 
 def starts(mission=MISSION, obstacles=None):
-    worlds = Physics(mission, 1)
+    worlds = PointWorlds(mission, 1)
     worlds.obstacles = obstacles
     return Starts(mission=mission, worlds=worlds, channel=None)
 
