@@ -32,6 +32,7 @@ class Streams(NamedTuple):
     localisation: list[np.random.Generator]
     sensing: list[np.random.Generator]
     bodies: list[np.random.Generator]
+    pilots: list[np.random.Generator]
 
 
 def streams_of(seeds: Sequence[int]) -> Streams:

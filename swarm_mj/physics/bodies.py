@@ -194,13 +194,17 @@ class BodyWorlds:
                 height_m[flown.robots] = flown.kind.base_m
         return height_m
 
-    def start(self, rngs: Sequence[np.random.Generator]) -> None:
-        """Draw what is each mission's own, from its generator: how robots differ, and gusts."""
+    def start(
+        self,
+        rngs: Sequence[np.random.Generator],
+        pilot_rngs: Sequence[np.random.Generator],
+    ) -> None:
+        """Draw what is each mission's own: how robots differ, and gusts; start the pilots."""
         if self._mission.robot_spread > 0.0:
             self._vary(rngs)
         for flown in self._flown:
             if isinstance(flown.pilot, Started):
-                flown.pilot.start(flown.kind.num_robots, rngs)
+                flown.pilot.start(flown.kind.num_robots, pilot_rngs)
         self._gusts = Stream(rngs, normal, (2,)) if self._mission.gust_mps > 0.0 else None
         self._gust_mps = np.zeros((len(rngs), 2))
         if self._gusts is not None:
@@ -298,17 +302,19 @@ class BodyWorlds:
         self._count_active()
 
     def _count_active(self) -> None:
-        """Take robots that crashed for failed; two stay on whatever happens, those of least number.
+        """Take robots that crashed for failed; two stay on whatever happens.
 
-        An age of information needs a pair.
+        An age of information needs a pair. Those that fly come first, then those that are still on:
+        of these the ones of least number, if several crash at once. What went off stays off.
         """
         if self._works is None and not np.any(self._has_crashed):
             return
         works = np.ones_like(self._has_crashed) if self._works is None else self._works
         is_active = works & ~self._has_crashed
+        was_active = works if self.states.is_active is None else self.states.is_active
         for b in np.flatnonzero(np.sum(is_active, axis=1) < MIN_SURVIVORS).tolist():
-            # First those that fly, then those that only crashed.
-            order = np.argsort(~is_active[b], kind="stable")
+            rank = np.where(is_active[b], 0, np.where(was_active[b], 1, 2))
+            order = np.argsort(rank, kind="stable")
             chosen = [i for i in order.tolist() if works[b, i]][:MIN_SURVIVORS]
             is_active[b, chosen] = True
         self.states = replace(self.states, is_active=is_active)

@@ -55,8 +55,12 @@ class Worlds(Protocol):
         """MuJoCo's coordinates of all worlds, and their rates, as they are now."""
         ...
 
-    def start(self, rngs: Sequence[np.random.Generator]) -> None:
-        """Draw what is each mission's own, from its generator."""
+    def start(
+        self,
+        rngs: Sequence[np.random.Generator],
+        pilot_rngs: Sequence[np.random.Generator],
+    ) -> None:
+        """Draw what is each mission's own, from its generator; pilots draw from theirs."""
         ...
 
     def draw_heights_m(self, rng: np.random.Generator) -> Float[np.ndarray, "N"] | None:
@@ -117,8 +121,12 @@ class PointWorlds:
         # True states, in arrays that later steps do not change.
         self.states = RobotStates(position_m=np.zeros(shape), velocity_mps=np.zeros(shape))
 
-    def start(self, rngs: Sequence[np.random.Generator]) -> None:
-        """Draw nothing: points are all alike."""
+    def start(
+        self,
+        rngs: Sequence[np.random.Generator],
+        pilot_rngs: Sequence[np.random.Generator],
+    ) -> None:
+        """Draw nothing: points are all alike, and have no pilots."""
 
     def draw_heights_m(self, rng: np.random.Generator) -> None:
         """Return no heights, which points do not have."""

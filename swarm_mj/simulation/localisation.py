@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Float
 
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Stream, normal
@@ -41,4 +42,9 @@ class Localisation:
             moves = np.any(states.velocity_mps, axis=2, keepdims=True)
             error_m = np.where(moves, walked_m, before_m)
         self._error_m = error_m
-        return replace(states, observed_m=states.position_m + error_m)
+        return replace(states, observed_m=self.observed_m(states))
+
+    def observed_m(self, states: RobotStates) -> Float[np.ndarray, "B N D"]:
+        """Return where robots observe themselves to be, with the errors of this moment [m]."""
+        assert self._error_m is not None  # `observed` has drawn them
+        return states.position_m + self._error_m

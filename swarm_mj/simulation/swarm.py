@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from copy import deepcopy
+from dataclasses import replace
 from functools import partial
 from numbers import Integral
 
@@ -167,7 +168,7 @@ class Swarm:
         starts = Starts(mission, self._physics, self.truth.channel)
         position_m = [starts.positions(b, rng) for b, rng in enumerate(rngs.placement)]
         velocity_mps = [initial_velocity(mission, rng) for rng in rngs.placement]
-        self._physics.start(rngs.bodies)
+        self._physics.start(rngs.bodies, rngs.pilots)
         self._physics.place(np.stack(position_m), np.stack(velocity_mps))
         self._survivors = draw_survivors(mission, rngs.failures)
         self._noise = None
@@ -226,7 +227,10 @@ class Swarm:
             raise ValueError("no policy flies yet; start one: swarm.start(policy)")
 
     def start(self, policy: Policy) -> None:
-        """Fly a policy from now on, with new random streams and all else forgotten.
+        """Fly a policy from now on, in place of the one that flew.
+
+        Robots, buffers and clock stay as they are, and the policy draws where the missions' random
+        streams are by now; `restart` begins missions anew.
 
         Args:
             policy: Made for this mission, as by `make_policy`.
@@ -287,7 +291,10 @@ class Swarm:
             ValueError: If the controller's accelerations are not one finite vector per robot, [B N
                 D].
         """
-        wanted_mps2 = self.controller(self._read_only, self._states_for(self._controller_is_ours))
+        states = self._states_for(self._controller_is_ours)
+        if self._noise is not None:
+            states = replace(states, observed_m=self._noise.observed_m(states))
+        wanted_mps2 = self.controller(self._read_only, states)
         states = self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
         return self._observed(states)
 

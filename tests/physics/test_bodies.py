@@ -116,7 +116,7 @@ def test_a_quadrotor_that_fell_lies_on_the_floor_which_carries_its_weight():
     """
     mission = paper("stationary", robot="quadrotor", num_robots=2, height_m=2.0)
     worlds = BodyWorlds(mission, 1, pilot=Resting())
-    worlds.start([np.random.default_rng(0)])
+    worlds.start([np.random.default_rng(0)], [])
     position_m = np.array([[[0.0, 0.0, 2.0], [50.0, 0.0, 2.0]]])
     worlds.place(position_m, np.zeros_like(position_m))
     for _ in range(40):
@@ -183,7 +183,7 @@ def test_two_robots_stay_on_whoever_crashes(box):
 
 
 def test_what_failed_never_counts_again():
-    """Of three that work one crashes: the others stay, and none of those that failed."""
+    """Of three that work one crashes, then another: its radio goes on, and none wakes up again."""
     worlds = BodyWorlds(paper("stationary", robot="quadrotor", num_robots=5), 1)
     worlds.deactivate(np.array([[False, True, True, True, False]]))
     worlds._has_crashed[0, 1] = True
@@ -191,7 +191,7 @@ def test_what_failed_never_counts_again():
     assert worlds.states.is_active.tolist() == [[False, False, True, True, False]]
     worlds._has_crashed[0, 2] = True
     worlds._count_active()
-    assert worlds.states.is_active.tolist() == [[False, True, False, True, False]]
+    assert worlds.states.is_active.tolist() == [[False, False, True, True, False]]
 
 
 def test_robots_that_crashed_fly_again_in_the_next_mission(box):
@@ -300,6 +300,23 @@ def test_a_pilot_is_a_class_too_and_begins_anew_with_every_mission(box):
     assert started == [(3, 2), (3, 2)]
 
 
+def test_a_pilot_draws_from_a_stream_of_its_own(box):
+    """However many numbers it draws, the gusts are as before."""
+
+    class Drawing(Hovering):
+        def start(self, _num_robots, rngs):
+            for rng in rngs:
+                rng.normal(size=7)
+
+    mission = paper("stationary", robot=box, num_robots=2, wind_mps=1.0, gust_mps=2.0)
+    winds_mps = []
+    for pilot in (Hovering, Drawing):
+        swarm = flown(mission, [1], 3, pilot=pilot)
+        winds_mps.append(swarm.states.wind_mps)
+    assert np.any(winds_mps[0])
+    np.testing.assert_array_equal(winds_mps[0], winds_mps[1])
+
+
 def test_a_scene_must_leave_the_robots():
     def heavier(spec, _mission):
         spec.body("r0/body").add_geom(size=[0.1, 0.0, 0.0], mass=3.0)
@@ -331,7 +348,7 @@ def test_quadrotors_that_touch_crash_only_if_they_collide():
     for collide in (False, True):
         mission = paper("stationary", robot="quadrotor", num_robots=4, collide=collide)
         worlds = BodyWorlds(mission, 1)
-        worlds.start([np.random.default_rng(0)])
+        worlds.start([np.random.default_rng(0)], [])
         position_m = np.array([[[0.0, 0, 20], [0.3, 0, 20], [50, 0, 20], [-50, 0, 20]]])
         worlds.place(position_m, np.zeros_like(position_m))
         states = worlds.step(np.zeros_like(position_m))
@@ -375,7 +392,7 @@ def pair_at_rest(robot, pilot=None, **fields):
     """A world of two robots, which start at rest 100 m apart."""
     mission = paper("random-walk", robot=robot, num_robots=2, **fields)
     worlds = BodyWorlds(mission, 1, pilot=pilot)
-    worlds.start([np.random.default_rng(0)])
+    worlds.start([np.random.default_rng(0)], [])
     position_m = np.zeros((1, 2, 3))
     position_m[0, :, 0] = (-50.0, 50.0)
     position_m[..., 2] = worlds.draw_heights_m(np.random.default_rng(0))
@@ -486,7 +503,7 @@ def test_gusts_have_the_deviation_and_the_time_that_were_asked_for():
     """Of 400 worlds after each of 30 windows, without a mean."""
     mission = paper("stationary", robot="rover", num_robots=2, gust_mps=2.0, gust_s=1.0)
     worlds = BodyWorlds(mission, 400)
-    worlds.start([np.random.default_rng(seed) for seed in range(400)])
+    worlds.start([np.random.default_rng(seed) for seed in range(400)], [])
     winds = []
     for _ in range(30):
         winds.append(worlds._wind[:, :2].copy())
@@ -593,7 +610,7 @@ def feeler(tmp_path):
 def placed(mission, position_m, pilot, **options):
     """Worlds that begin at rest, at these places of the first mission and of all others."""
     worlds = BodyWorlds(mission, 2, pilot=pilot, **options)
-    worlds.start([np.random.default_rng(b) for b in range(2)])
+    worlds.start([np.random.default_rng(b) for b in range(2)], [])
     position_m = np.broadcast_to(position_m, (2, mission.num_robots, 3)).copy()
     worlds.place(position_m, np.zeros_like(position_m))
     return worlds

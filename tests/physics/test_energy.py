@@ -22,7 +22,7 @@ def worlds_of(mission, velocity_mps=0.0):
 
 def placed(worlds, velocity_mps=0.0):
     """Start such worlds."""
-    worlds.start([np.random.default_rng(1)])
+    worlds.start([np.random.default_rng(1)], [])
     position_m = np.zeros_like(worlds.states.position_m)
     position_m[0, :, 0] = 20.0 * np.arange(position_m.shape[1])
     position_m[..., 2] = worlds.draw_heights_m(np.random.default_rng(2))

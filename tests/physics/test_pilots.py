@@ -16,7 +16,7 @@ def worlds(robot, num_robots=2, pilot=None, **fields):
     """Worlds of one mission of robots that stand still, far apart."""
     mission = paper("random-walk", robot=robot, num_robots=num_robots, **fields)
     flown = BodyWorlds(mission, 1, pilot=pilot)
-    flown.start([np.random.default_rng(0)])
+    flown.start([np.random.default_rng(0)], [])
     position_m = np.zeros((1, num_robots, 3))
     position_m[0, :, 0] = 50.0 * np.arange(num_robots) - 100.0
     position_m[..., 2] = flown.draw_heights_m(np.random.default_rng(0))

@@ -80,6 +80,24 @@ def test_the_truth_and_the_radio_do_not_err(task, physics):
     assert np.std(noisy[2] - noisy[0]) == pytest.approx(20.0, rel=0.5)
 
 
+def test_a_controller_sees_where_its_robots_observe_themselves_to_be():
+    """That is what a robot's own buffer says of itself."""
+    seen_m = []
+
+    def rest(buffers, states):
+        own_m = buffers.position_m[:, EVERYONE, EVERYONE]
+        np.testing.assert_allclose(states.own_m, own_m, atol=1e-9)
+        seen_m.append(states.own_m - states.position_m)
+        return np.zeros_like(states.position_m)
+
+    mission = paper("random-walk", num_robots=10, position_noise_m=20.0)
+    swarm = Swarm(mission, [1], controller=rest)
+    swarm.start(make_policy("tdma", mission))
+    for _ in range(5):
+        swarm.step()
+    assert np.std(seen_m[-1]) == pytest.approx(20.0, rel=0.5)
+
+
 def test_without_noise_its_time_changes_nothing():
     for one, other in zip(flown("planner"), flown("planner", position_noise_s=3.0), strict=True):
         np.testing.assert_array_equal(one, other)

@@ -81,7 +81,7 @@ def test_it_keeps_off_a_tree_that_others_hit():
     for pilot in ("swarm_mj.physics.pilots:QuadrotorPilot", SCANNERS["pilot"]):
         mission = paper("random-walk", robot=str(SCANNER), num_robots=40, arena="forest")
         worlds = BodyWorlds(mission, 1, pilot=pilot)
-        worlds.start([np.random.default_rng(0)])
+        worlds.start([np.random.default_rng(0)], [])
         position_m = np.zeros((1, 40, 3))
         position_m[0] = np.column_stack([np.arange(40.0), np.zeros(40), np.full(40, 50.0)])
         position_m[0, 0] = (26.0, tree_m[1], 5.0)

@@ -290,6 +290,8 @@ def _look_around(
         sum_x += x
         sum_y += y
         sum_ranges += ranges[j]
+        if position_m.shape[1] > PLANE:  # an edge is one in the plane, but packets rise
+            ranges[j] = np.hypot(ranges[j], (position_m[j, 2] - position_m[i, 2]) / range_m)
         if ranges[j] < TAKEN_WITHIN:
             neighbours += chance(ranges[j], reach, REACH_SCALE)
     edge = MIDDLE

@@ -114,6 +114,22 @@ def test_states_and_ages():
     assert not graphs.has_turn.any()
 
 
+def test_heights_are_part_of_distances():
+    """Robot 0 flies 300 m above robot 1, 1.2 ranges: no packet reaches it."""
+    flat = buffers_of_robot_1()
+    lifted = np.zeros((*flat.position_m.shape[:3], 3))
+    lifted[..., :2] = flat.position_m
+    lifted[..., 0, 2] = 300.0
+    moved = np.zeros_like(lifted)
+    moved[..., :2] = flat.velocity_mps
+    mission = paper("stationary", num_robots=5, robot="quadrotor")
+    found, graphs = seen(replace(flat, position_m=lifted, velocity_mps=moved), mission)
+    apart_m = math.hypot(50.0, 300.0)
+    np.testing.assert_allclose(found["distance"][0], apart_m / 250.0 / 4.0, rtol=1e-6)
+    assert found["is in range"].tolist() == [0, 0, 0, 0, 1]
+    assert graphs.may_address[OBSERVER].tolist() == [False, True, True, False, True]
+
+
 def test_the_tree_of_parents():
     """Robot 4's news came over robot 3, whose own came over robot 0."""
     check(

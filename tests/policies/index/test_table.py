@@ -31,7 +31,8 @@ class Robot:
         num = len(places)
         self.table = empty_table(1, num)
         self.gain = empty_gain(1, num)
-        self.places = np.broadcast_to(np.array(places), (1, num, num, 2)).copy()
+        places_m = np.array(places)
+        self.places = np.broadcast_to(places_m, (1, num, *places_m.shape)).copy()
         self.timestamp = np.broadcast_to(np.array(timestamp, dtype=float), (1, num, num)).copy()
         self.is_known = np.ones((1, num, num), bool) if is_known is None else is_known
 
@@ -92,10 +93,19 @@ def test_neighbours_near_the_sender_have_decoded_it_too_and_none_knows_less_for_
     before = robots.bound(0, 2)
     robots.note(heard=[1, 1, 2], packet=packet)
     assert robots.bound(0, 2) == [before[0], NOW, KNOWS_ITSELF]
-    robots.places[0, 0, 2] = (50.0 + 1.5 * RANGE_M, 0.0)  # out of the sender's range
+    robots.places[0, 0, 2] = (-1.0 * RANGE_M, 0.0)  # still a neighbour, but 1.5 ranges from it
     packet[1, 0] = 19.0
     robots.note(heard=[1, 1, 2], packet=packet)
-    assert robots.table.row[0, 0, 2] == NO_ROW or robots.bound(0, 2)[0] == before[0]
+    assert robots.bound(0, 2)[0] == before[0]
+
+
+def test_heights_part_robots_too():
+    """Robot 1 flies 3 ranges above, so it has no row; robot 2 flies 0.5 above, and keeps one."""
+    places = ((0.0, 0.0, 0.0), (0.0, 0.0, 3.0 * RANGE_M), (0.0, 0.0, 0.5 * RANGE_M))
+    robots = Robot(places, (18.0, 16.0, 14.0))
+    robots.note()
+    assert robots.table.row[0, 0, 1] == NO_ROW
+    assert robots.table.row[0, 0, 2] != NO_ROW
 
 
 def test_entries_that_a_packet_left_out_stay_as_they_were():
