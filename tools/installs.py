@@ -101,7 +101,7 @@ INSTALLS = (
         lines=(
             "pip install filelock jaxtyping msgspec 'mujoco>=3.17,<5' 'numba>=0.68,<0.69' numpy "
             "packaging psutil rich scipy",
-            "pip install --no-deps swarm_mj-1.0.0-py3-none-any.whl",
+            "pip install --no-deps swarm_mj-1.1.0-py3-none-any.whl",
         ),
         program=FLY_THE_CORE,
     ),

@@ -12,7 +12,7 @@ def test_all_shown_lines_are_tried_and_no_others():
 
 
 def test_a_line_installs_this_wheel_in_place_of_the_package():
-    wheel = Path("/dist/swarm_mj-1.0.0-py3-none-any.whl")
+    wheel = Path("/dist/swarm_mj-1.1.0-py3-none-any.whl")
     install = Install(lines=("pip install '.[ray]' vmas",), program="", is_on_top=True)
     first, second = commands(install, Path("/env/bin/python"), wheel)
     assert first[-1] == str(wheel)
