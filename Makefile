@@ -11,7 +11,7 @@ SCALE ?= paper
 STUDIES ?=
 BUDGET ?= quick
 
-.PHONY: help setup setup-dev fly bench check same test test-all test-engines test-installs attack reference lock audit format results leaderboard figures reproduce picture video docs docs-serve clean
+.PHONY: help setup setup-dev fly bench bench-peers check same test test-all test-engines test-installs attack reference lock audit format results leaderboard figures reproduce picture video docs docs-serve clean
 
 help:
 	@echo "make fly     set up if needed and fly the default mission; ARGS='--task random-walk'"
@@ -25,6 +25,7 @@ help:
 	@echo "make same    prove that every flight and training is as before, to the last digit; ARGS='--against HEAD~1'"
 	@echo "make format  let the formatter and the linter mend what they can"
 	@echo "make bench   time the simulation on this machine"
+	@echo "make bench-peers  time it beside MuJoCo alone, VMAS and the paper's authors' code; ARGS='--authors DIR'"
 	@echo "make results fly every table and figure of the docs, at one commit: hours; SCALE=smoke takes minutes"
 	@echo "make leaderboard  fly the benchmark and write training/leaderboard.md"
 	@echo "make figures draw all figures from training/results/"
@@ -71,6 +72,19 @@ fly: setup
 
 bench: setup
 	$(BIN)/swarm-mj bench $(ARGS)
+
+bench-peers: setup .venv/peers/ready
+	PYTHONPATH=. .venv/peers/bin/python tools/peers.py $(ARGS)
+
+# VMAS is under the GPL and no dependency: it has an environment of its own, which sees all of .venv,
+# so that torch is there once. gym, of VMAS, also serves the authors' code.
+.venv/peers/ready: Makefile
+	@echo "Installing VMAS in .venv/peers (41 MB) ..."
+	@$(PYTHON) -m venv .venv/peers
+	@$(BIN)/python -c "import sysconfig; print(sysconfig.get_path('purelib'))" > \
+	  $$(.venv/peers/bin/python -c "import sysconfig; print(sysconfig.get_path('purelib'))")/others.pth
+	@.venv/peers/bin/python -m pip install --quiet --disable-pip-version-check vmas==1.5.2 gym==0.26.2
+	@touch $@
 
 check: $(DEV)
 	$(BIN)/ruff format --check .

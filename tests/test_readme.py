@@ -26,7 +26,7 @@ REASONS = {
     "a part of a file": r"<custom>",
     "opens a viewer": "replay|view|show|human",
     "needs OpenGL": "video|render",
-    "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari",
+    "needs an environment of its own": "benchmarl|torchrl|ray|RecordVideo|minari|bench-peers",
     "installs packages": "^pip install",
     "takes minutes": "train|check",
     "needs SLURM": "slurm",
