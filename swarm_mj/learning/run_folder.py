@@ -9,7 +9,7 @@ import os
 from collections.abc import Collection
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import NamedTuple
+from typing import Any, NamedTuple, TypeAlias
 
 from swarm_mj.learning.selection import (
     OTHER_FLIGHTS,
@@ -22,14 +22,16 @@ from swarm_mj.learning.selection import (
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import remembers_packets
+from swarm_mj.policies.policy_config import NO_BOUND
 from swarm_mj.policies.stored import POLICY
 from swarm_mj.replay.replay_size import IN_MEMORY, ON_DISK
 from swarm_mj.simulation.memory import LIBRARIES, TORCH, learned_memory, policy_memory
 from swarm_mj.system import needs
 from swarm_mj.system.fields import check, common_setting, setting
-from swarm_mj.system.reading import read_document, read_file, read_rows
+from swarm_mj.system.reading import read_document, read_file, read_plain, read_rows
 from swarm_mj.system.writing import write_json
 
+Document: TypeAlias = dict[str, Any]  # JSON as it was read
 SETTINGS = "settings.json"
 CHECKPOINT = "checkpoint.pt"
 CURVE = "curve.csv"
@@ -38,6 +40,9 @@ REPLAYS = "replays"
 TENSORBOARD = "tensorboard"
 FORMAT = "swarm_mj training run"
 FORMAT_VERSION = 2  # 1 called the kind of credit `arm`
+# Settings that version 1.0 had no names for, as it trained.
+AS_1_0_TRAINED: Document = {"most_speech": NO_BOUND, "unknown_age": 0.0, "train_windows": []}
+AS_1_0_OPTIMISED: Document = {"horizon": 1, "considered": 1.0, "kept": 0.0}
 MAX_BYTES = 1_000_000  # of the settings
 MAX_CURVE_BYTES = 10_000_000
 # Team decisions, by the credit or the policy; the paper's for the paper's way.
@@ -108,19 +113,28 @@ def read_run(folder: Path, named: Collection[str] | None = ()) -> TrainingRun:
     """Return what a run was asked for when it began, or last went on.
 
     Users' own components, as `module:Name`, must be `named`: to go on runs their code, and a folder
-    may come from anyone; None is to look only. Raises ValueError if one is not, if there is no run,
-    or if its settings are damaged, foreign or of another version; OSError if they cannot be read.
+    may come from anyone; None is to look only, as one may at runs of version 1.0, too. Raises
+    ValueError if one is not named, if there is no run, or if its settings are damaged, foreign or
+    of another version; OSError if they cannot be read.
     """
     path = folder / SETTINGS
     if not os.path.lexists(path):
         raise ValueError(f"{folder} holds no run to go on with; to begin one, leave out --resume")
     text = read_file(path, "settings", MAX_BYTES)
     try:
-        run = read_document(text, FORMAT, FORMAT_VERSION, TrainingRun)
+        document: Document = read_document(text, FORMAT, FORMAT_VERSION, dict)
+        is_of_1_0 = _is_of_1_0(document)
+        run = read_plain(_as_1_0_trained(document) if is_of_1_0 else document, TrainingRun)
     except ValueError as error:
         raise ValueError(
             f"settings {path} are damaged, no run's, or from an earlier version: {error}"
         ) from error
+    if is_of_1_0 and named is not None:
+        raise ValueError(
+            f"{folder} began with version 1.0 or before, whose way of training is gone; begin "
+            f"another run with its policy, --init {folder} --features "
+            f"{run.training.features:.200}, in another folder, --out"
+        )
     for name in run.training.own.values():
         if named is not None and name not in named:
             raise ValueError(
@@ -128,6 +142,21 @@ def read_run(folder: Path, named: Collection[str] | None = ()) -> TrainingRun:
                 f"the run's {run.training.own_options} again"
             )
     return run
+
+
+def _is_of_1_0(document: Document) -> bool:
+    """Return whether settings are of version 1.0, which alone left out some of the silent rows."""
+    training = document.get("training")
+    ppo = training.get("ppo") if isinstance(training, dict) else None
+    return isinstance(ppo, dict) and "silent_share" in ppo
+
+
+def _as_1_0_trained(document: Document) -> Document:
+    """Return settings of version 1.0 with what it did where they now say more."""
+    training = document["training"]
+    ppo = AS_1_0_OPTIMISED | training["ppo"]
+    del ppo["silent_share"]
+    return document | {"training": AS_1_0_TRAINED | training | {"ppo": ppo}}
 
 
 class CurvePoint(NamedTuple):

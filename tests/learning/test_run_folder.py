@@ -54,6 +54,40 @@ def test_settings_of_before_packets_were_considered_have_the_usual_number(tmp_pa
     assert read_run(tmp_path) == RUN
 
 
+def as_1_0_wrote(folder):
+    """Changes a run's settings to what version 1.0 wrote, which had no names for some of them."""
+    whole = json.loads((folder / SETTINGS).read_text())
+    training = whole["training"]
+    for name in ("most_speech", "unknown_age", "train_windows"):
+        del training[name]
+    for name in ("horizon", "considered", "kept"):
+        del training["ppo"][name]
+    training["ppo"]["silent_share"] = 0.1
+    (folder / SETTINGS).write_text(json.dumps(whole))
+
+
+def test_a_run_of_version_1_0_is_looked_at_but_does_not_go_on(tmp_path):
+    """It bounded no speech, drew no lengths, and credited a packet with its own window alone."""
+    write_run(tmp_path, RUN)
+    as_1_0_wrote(tmp_path)
+    training = read_run(tmp_path, named=None).training
+    assert (training.most_speech, training.unknown_age, training.train_windows) == (1.0, 0.0, ())
+    assert (training.ppo.horizon, training.ppo.considered, training.ppo.kept) == (1, 1.0, 0.0)
+    way_out = rf"version 1.0 or before, .*--init {tmp_path} --features {training.features}, in"
+    with pytest.raises(ValueError, match=way_out):
+        read_run(tmp_path)
+
+
+def test_damaged_settings_of_version_1_0_are_refused(tmp_path):
+    write_run(tmp_path, RUN)
+    as_1_0_wrote(tmp_path)
+    whole = json.loads((tmp_path / SETTINGS).read_text())
+    whole["training"]["seed"] = "3"
+    (tmp_path / SETTINGS).write_text(json.dumps(whole))
+    with pytest.raises(ValueError, match="are damaged, no run's, or from an earlier version"):
+        read_run(tmp_path)
+
+
 @pytest.mark.parametrize("text", ["", "{", "[]", "null", "{}", '{"format": "swarm_mj policy"}'])
 def test_what_is_no_settings_is_refused(tmp_path, text):
     (tmp_path / SETTINGS).write_text(text)
