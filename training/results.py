@@ -5,10 +5,11 @@
     python training/results.py --studies paper-random-walk channels
 
 Each file of `training/studies/` is a study, flown as `swarm-mj study run` does. `gnn` flies the
-trained policies of `reproduce.py`, `crashes` the studies of `crashes.py`; `deciding` runs
-`swarm-mj bench`. Each leaves a table of its name in `training/results/`: `NAME.csv` has a row for
-each policy and regime, `NAME.parquet` one for each mission. What is there of this commit is kept;
-`--force` flies it again, but for `gnn`: there `reproduce.py --force` does, and trains anew.
+trained policies of `reproduce.py`, `crashes` the studies of `crashes.py`; `routes` counts whom
+robots address, and `deciding` runs `swarm-mj bench`. Each leaves a table of its name in
+`training/results/`: `NAME.csv` has a row for each policy and regime, `NAME.parquet` one for each
+mission. What is there of this commit is kept; `--force` flies it again, but for `gnn`: there
+`reproduce.py --force` does, and trains anew.
 An interrupted run continues where it broke off. Then `tools/results_table.py` writes the numbers
 into the docs, and `make figures` draws them.
 """
@@ -26,6 +27,7 @@ import bounds
 import crashes
 import flocking_converges
 import reproduce
+import routes
 
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli import script
@@ -46,7 +48,8 @@ MISSIONS, WINDOWS = 2, 12  # of smoke, each study's
 FOLDER = ROOT / "training" / "studies"
 SHIPPED = {"impairments": "impairments-small"}  # with the package, under other names
 STUDIES = tuple(sorted([*SHIPPED, *(path.stem for path in FOLDER.glob("*.toml"))]))
-OTHERS = ("gnn", "floor", "converging-courses", "crashes", "deciding")  # no study describes them
+# No study describes these.
+OTHERS = ("gnn", "routes", "floor", "converging-courses", "crashes", "deciding")
 KINDS = (".csv", ".parquet")
 MAX_BYTES = 100_000_000
 
@@ -163,6 +166,13 @@ def fly_gnn(settings: Settings) -> int:
     return reproduce.run(replace(usual, fly=few, results=settings.folder / "reproduce"))
 
 
+def fly_routes(settings: Settings) -> int:
+    """Fly teams at rest, and count whom their robots address; return the exit code."""
+    usual = routes.Settings(out=settings.folder / "routes.csv")
+    few = {"num_missions": MISSIONS, "num_windows": 10 * WINDOWS, "ratios": (1.0,)}
+    return routes.run(replace(usual, **few) if settings.is_smoke else usual)
+
+
 def measure_deciding(settings: Settings) -> int:
     """Time this machine, and the policies' decisions; return the exit code."""
     path, out = settings.folder / "bench.json", settings.folder / "deciding.csv"
@@ -186,6 +196,7 @@ FLOWN_BY: dict[str, Callable[[Settings], int]] = {
     "converging-courses": fly_courses,
     "crashes": fly_crashes,
     "gnn": fly_gnn,
+    "routes": fly_routes,
 }
 
 
