@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 from jaxtyping import Float
 from mujoco._enums import mjtDisableBit
-from mujoco._specs import MjsGeom, MjSpec
+from mujoco._specs import MjsActuator, MjsGeom, MjsJoint, MjSpec
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
@@ -249,7 +249,7 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
         return
     spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for i in range(mission.num_robots):
-        _hull(spec, i).conaffinity |= 1  # meets the scene's geoms, no robot
+        _hull(spec, i).conaffinity |= SCENE_BIT  # meets the scene's geoms, no robot
     for geom in spec.geoms:
         if geom.group == OBSTACLE_GROUP:
             _bounce(geom, mission, priority=1)  # its own contact parameters count
@@ -276,12 +276,15 @@ def _check_unchanged(what: str, before: dict[str, str], after: dict[str, str]) -
 
 
 def _moving_parts(spec: MjSpec) -> list[str]:
-    """Return what a message calls each joint and actuator; one without a name, by its body."""
-    joints = [
-        f"joint {joint.name}" if joint.name else f"a joint to body {joint.parent.name}"
-        for joint in spec.joints
-    ]
-    return joints + [f"actuator {actuator.name}" for actuator in spec.actuators]
+    """Return what a message calls each joint and actuator; no two of them are called alike."""
+    joints = [f"joint {_called(n, joint)}" for n, joint in enumerate(spec.joints)]
+    actuators = [f"actuator {_called(n, each)}" for n, each in enumerate(spec.actuators)]
+    return joints + actuators
+
+
+def _called(n: int, part: MjsJoint | MjsActuator) -> str:
+    """Return the name of the n-th joint or actuator; models need not give them names."""
+    return part.name or f"{n}, which has no name"
 
 
 def _hulls(spec: MjSpec, mission: Mission) -> dict[str, str]:
@@ -311,10 +314,10 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 
 def _motion(spec: MjSpec) -> dict[str, str]:
     """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
-    parts = [(part.name, part) for part in (*spec.joints, *spec.actuators)]
-    parts.append(("option", spec.option))
+    parts = [*spec.joints, *spec.actuators, spec.option]
+    owners = [*_moving_parts(spec), "option"]
     motion: dict[str, str] = {}
-    for owner, part in parts:
+    for owner, part in zip(owners, parts, strict=True):
         for name in MOVING:
             value = getattr(part, name, None)
             if value is not None:
