@@ -124,8 +124,9 @@ class Components:
             The components; what was an object is the same object.
 
         Raises:
-            ValueError: One cannot be loaded or made, is not called as its kind is, is a channel
-                that takes the place of effects that the mission asks for, or a pilot of points.
+            ValueError: One cannot be loaded or made, is not called as its kind is, is a channel's
+                name that takes the place of effects that the mission asks for, or a pilot of
+                points. A channel that is an object may take their place: it may hold them itself.
         """
         made = self
         for kind, name in self.given.items():
