@@ -119,6 +119,7 @@ class SpatialTdma(Tdma):
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        self._num_robots = mission.num_robots
         self._num_axes = mission.num_axes
         self._range_m = mission.range_m
         self._threshold = from_db(mission.sinr_threshold_db)
@@ -131,10 +132,8 @@ class SpatialTdma(Tdma):
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""
-        law = belief.law
-        if law is not None:
-            law = law._replace(at_1_m=law.at_1_m / belief.radio.noise_mw)
-        self._law = law
+        super().inform(belief)
+        self._law = None if belief.law is None else belief.law_over_noise(self._num_robots)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order, and forget powers; arguments as in `Policy.start`."""
