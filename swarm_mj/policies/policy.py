@@ -187,7 +187,7 @@ def two_broadcasts(mission: Mission) -> DoubleBroadcast:
     """
     return DoubleBroadcast(
         silence_is_attempt=mission.silence_is_attempt,
-        needs_addressees=mission.half_duplex == "eavesdroppers",
+        needs_addressees=mission.recipient_hears_while_sending,
     )
 
 
