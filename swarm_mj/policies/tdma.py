@@ -16,7 +16,7 @@ from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.about import FEW_BYTES, Information, Listed, Look, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, slot_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import PowerLaw, no_powers
@@ -195,11 +195,6 @@ class SpatialTdma(Tdma):
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:
     """Return a random order for each mission: the robot at each place of it."""
     return np.stack([rng.permutation(num_robots) for rng in rngs])
-
-
-def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
-    """Return the slot that begins now, counted from 0 at the mission's start."""
-    return np.rint(now / SLOT_WINDOWS).astype(np.int64)
 
 
 @compiled()
