@@ -9,8 +9,7 @@ from typing import Any, TypedDict
 
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
-from swarm_mj.physics.robots import CALLED_WITH as CALLED_AS_PILOT
-from swarm_mj.physics.robots import OwnPilot
+from swarm_mj.physics.robots import CALLED_AS_PILOT, OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.free_space import Channel, VaryingChannel
