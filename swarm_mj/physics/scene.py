@@ -14,7 +14,7 @@ from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.arenas import arena_of
-from swarm_mj.physics.obstacles import OBSTACLE_GROUP
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP, ROBOTS_BIT, SCENE_BIT
 from swarm_mj.physics.pilots import GRAVITY_MPS2
 from swarm_mj.physics.robots import RobotKind, add_robots, kinds_of, pose_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
@@ -54,8 +54,6 @@ WALL_HALF_HEIGHT_M = 5.0  # assets/arena.xml
 NAMES = {"name", "joint"}  # attributes that hold a robot's own names, assets/robot.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
-SCENE_BIT = 1  # of the masks that say who collides: what scenes add
-ROBOTS_BIT = 2  # of these masks: robots, where they collide with each other
 AIR_DENSITY = 1.204  # around bodies, at 20 °C and sea level [kg/m³]
 AIR_VISCOSITY = 1.82e-5  # likewise [Pa s]
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
