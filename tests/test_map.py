@@ -110,7 +110,7 @@ def imports(path):
             {"system.compiled", "system.decibels", "mission.geometry", "radio.reception"},
         ),
         ("physics/state", set()),
-        ("protocol/timestamps", {"system.compiled"}),
+        ("protocol/timestamps", {"mission.team", "system.compiled"}),
         (
             "protocol/buffers",
             {"system.compiled", "mission.geometry", "physics.state", "protocol.timestamps"},

@@ -50,7 +50,8 @@ def check_seeds(seeds: Sequence[int], expected: int | None = None) -> None:
         isinstance(seed, Integral) and not isinstance(seed, bool) and 0 <= seed <= MAX_SEED
         for seed in seeds
     )
-    if not is_whole or len(seeds) != (expected or max(1, len(seeds))):
+    is_right_count = len(seeds) > 0 if expected is None else len(seeds) == expected
+    if not is_whole or not is_right_count:
         count = "one or more" if expected is None else str(expected)
         raise ValueError(
             f"seeds must be {count} integers from 0 to {MAX_SEED}, not {list(seeds)!s:.80}"

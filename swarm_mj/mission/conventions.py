@@ -26,7 +26,7 @@ class Conventions:
     half_duplex: HalfDuplex = setting(
         "strict",
         label="half duplex",
-        source="II-A",
+        source="II-A; by the code an addressed robot hears while it sends, only others do not",
         choices=get_args(HalfDuplex),
     )
     flocking_set: FlockingSet = setting(
@@ -51,6 +51,11 @@ class Conventions:
         False,
         source="IV-C; the code's root addresses the last robot",
     )
+
+    @property
+    def recipient_hears_while_sending(self) -> bool:
+        """True if a robot decodes what is addressed to it while it sends, though nothing else."""
+        return self.half_duplex == "eavesdroppers"
 
 
 class ConventionsFields(TypedDict, total=False):

@@ -13,6 +13,7 @@ Task = Literal["stationary", "random-walk", "flocking"]
 MISSION_DISTANCE_M = 1000.0
 MISSION_DURATION_S = 50.0  # 500 windows of 100 ms: the duration that velocity ratios mean (IV-B)
 SQUARE_METRES_PER_KM2 = 1e6
+SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses (III-B)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -124,8 +125,8 @@ class Team:
 
     @property
     def slot_s(self) -> float:
-        """Length of a slot; a window has two (III-B) [s]."""
-        return self.window_s / 2.0
+        """Length of a slot; a window has `SLOTS_PER_WINDOW` [s]."""
+        return self.window_s / SLOTS_PER_WINDOW
 
     @property
     def max_velocity_mps(self) -> float:

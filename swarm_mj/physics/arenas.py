@@ -17,14 +17,14 @@ from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.mission.team import SQUARE_METRES_PER_KM2
 from swarm_mj.physics.arena_files import add_file, read_arena
 from swarm_mj.physics.materials import BUILDING, LIGHT_WALL, TREE, Material
-from swarm_mj.physics.obstacles import OBSTACLE_GROUP, idle_obstacles
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP, SCENE_BIT, idle_obstacles
 from swarm_mj.system.arguments import did_you_mean
 
 Arena = Callable[[MjSpec, Mission], None]  # adds the obstacles
 
 BOX_SHAPE = mjtGeom.mjGEOM_BOX
 CYLINDER_SHAPE = mjtGeom.mjGEOM_CYLINDER
-HALF_HEIGHT_M = 5.0  # of obstacles: well above the robots
+HALF_HEIGHT_M = 5.0  # of obstacles: they end above points and rovers, and below most that flies
 
 
 def arena_of(mission: Mission) -> Arena | None:
@@ -118,7 +118,7 @@ def _add(
         size=[*size_m, HALF_HEIGHT_M],
         material=material.name,
         group=OBSTACLE_GROUP,
-        contype=1,
+        contype=SCENE_BIT,
         conaffinity=0,
     )
 

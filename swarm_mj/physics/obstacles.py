@@ -15,6 +15,9 @@ from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, O
 from swarm_mj.system.decibels import from_db
 
 OBSTACLE_GROUP = 1
+# Of the masks that say who collides.
+SCENE_BIT = 1  # arenas, and what scenes add
+ROBOTS_BIT = 2  # robots, where they collide with each other
 MESH = 7  # as MuJoCo numbers it
 
 

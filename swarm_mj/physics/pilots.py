@@ -133,7 +133,8 @@ class RoverPilot:
     nearer, and drives as fast as its heading allows.
     """
 
-    MOST_MPS = 2.0  # assets/rover.xml, as the next one
+    # The greatest speed and turn rate of Clearpath's data sheet of the Jackal, as assets/rover.xml.
+    MOST_MPS = 2.0
     MOST_RPS = 4.0
 
     def __init__(self, airframe: Airframe) -> None:
@@ -163,14 +164,20 @@ class RoverPilot:
         )
 
 
-# Of the quadrotor, each per second or its square: of velocity, height, climb, tilt and so on.
-_VELOCITY_GAIN = 2.5
-_HEIGHT_GAIN = 4.0
-_CLIMB_GAIN = 4.0
-_TILT_GAIN = 80.0
-_TURN_GAIN = 14.0
-_YAW_GAIN = 4.0
-_YAW_RATE_GAIN = 4.0
+# Of the quadrotor.
+_VELOCITY_GAIN = 2.5  # acceleration by an error of the horizontal velocity [1/s]
+_HEIGHT_GAIN = 4.0  # vertical acceleration by an error of the height [1/s²]
+_CLIMB_GAIN = 4.0  # vertical acceleration by an error of the climb [1/s]
+_TILT_GAIN = 80.0  # acceleration of roll and pitch by the sine of the tilt that is missing [1/s²]
+_TURN_GAIN = 14.0  # against their rates [1/s]
+_YAW_GAIN = 4.0  # acceleration of yaw by its error [1/s²]
+_YAW_RATE_GAIN = 4.0  # against its rate [1/s]
+
+
+@compiled(forceinline=True, makes_arrays=False)
+def _front(w: float, a: float, e: float, c: float) -> tuple[float, float, float]:
+    """Return the axis that points forwards, in the world's frame, of a robot with this attitude."""
+    return 1.0 - 2.0 * (e * e + c * c), 2.0 * (a * e + w * c), 2.0 * (a * c - w * e)
 
 
 @compiled(makes_arrays=False)
@@ -203,14 +210,12 @@ def _steer_quadrotors(
                 x *= most_tilt * z / flat
                 y *= most_tilt * z / flat
             size = math.sqrt(x * x + y * y + z * z)
-            # The rotation's columns are the body's axes in the world's frame.
+            # Its axes in the world's frame are the columns of its rotation.
             w, a, e, c = attitude[b, i]
             up_x = 2.0 * (a * c + w * e)
             up_y = 2.0 * (e * c - w * a)
             up_z = 1.0 - 2.0 * (a * a + e * e)
-            front_x = 1.0 - 2.0 * (e * e + c * c)
-            front_y = 2.0 * (a * e + w * c)
-            front_z = 2.0 * (a * c - w * e)
+            front_x, front_y, front_z = _front(w, a, e, c)
             left_x = 2.0 * (a * e - w * c)
             left_y = 1.0 - 2.0 * (a * a + c * c)
             left_z = 2.0 * (e * c + w * a)
@@ -233,10 +238,10 @@ def _steer_quadrotors(
                 control[b, i, u] = min(max(wanted, least[u]), most[u])
 
 
-# Of the rover, per second.
-_DRIVE_GAIN = 5.0
-_HEADING_GAIN = 3.0
-_STEER_GAIN = 10.0
+# Of the rover.
+_DRIVE_GAIN = 5.0  # acceleration by an error of the speed [1/s]
+_HEADING_GAIN = 3.0  # turn rate by an error of the heading [1/s]
+_STEER_GAIN = 10.0  # acceleration of the heading by an error of the turn rate [1/s]
 _STANDS_MPS = 0.01  # slower than this, no heading is better than another
 
 
@@ -255,8 +260,7 @@ def _steer_rovers(
     for b in range(control.shape[0]):
         for i in range(control.shape[1]):
             w, a, e, c = attitude[b, i]
-            front_x = 1.0 - 2.0 * (e * e + c * c)
-            front_y = 2.0 * (a * e + w * c)
+            front_x, front_y, _ = _front(w, a, e, c)
             along = wanted_mps[b, i, 0] * front_x + wanted_mps[b, i, 1] * front_y
             across = wanted_mps[b, i, 1] * front_x - wanted_mps[b, i, 0] * front_y
             turn_rps = 0.0

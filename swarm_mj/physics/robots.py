@@ -40,7 +40,7 @@ MOST_ANTENNA_M = 10.0  # above or below the base
 OFF_AXIS_M = 1e-6  # as much as a compiled model rounds by
 
 OwnPilot = Pilot | type | str  # an object, a class that is made for an airframe, or its name
-CALLED_WITH = ("sensed", "wanted", "control")  # a pilot
+CALLED_AS_PILOT = ("sensed", "wanted", "control")
 NEVER_CUT = [int(mjtSensor.mjSENS_GEOMFROMTO), int(mjtSensor.mjSENS_CONTACT)]  # by a cutoff
 
 
@@ -319,7 +319,7 @@ def _own_pilot(own: OwnPilot, airframe: Airframe) -> Pilot:
         made = make("pilot", own, airframe)
     elif isinstance(own, type):
         made = own(airframe)
-    check_component("pilot", made, CALLED_WITH)
+    check_component("pilot", made, CALLED_AS_PILOT)
     return made
 
 

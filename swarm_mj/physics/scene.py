@@ -9,12 +9,12 @@ from xml.etree import ElementTree
 import numpy as np
 from jaxtyping import Float
 from mujoco._enums import mjtDisableBit
-from mujoco._specs import MjsGeom, MjSpec
+from mujoco._specs import MjsActuator, MjsGeom, MjsJoint, MjSpec
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
 from swarm_mj.physics.arenas import arena_of
-from swarm_mj.physics.obstacles import OBSTACLE_GROUP
+from swarm_mj.physics.obstacles import OBSTACLE_GROUP, ROBOTS_BIT, SCENE_BIT
 from swarm_mj.physics.pilots import GRAVITY_MPS2
 from swarm_mj.physics.robots import RobotKind, add_robots, kinds_of, pose_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
@@ -54,8 +54,6 @@ WALL_HALF_HEIGHT_M = 5.0  # assets/arena.xml
 NAMES = {"name", "joint"}  # attributes that hold a robot's own names, assets/robot.xml
 SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
-SCENE_BIT = 1  # of the masks that say who collides: what scenes add
-ROBOTS_BIT = 2  # of these masks: robots, where they collide with each other
 AIR_DENSITY = 1.204  # around bodies, at 20 °C and sea level [kg/m³]
 AIR_VISCOSITY = 1.82e-5  # likewise [Pa s]
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
@@ -249,7 +247,7 @@ def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
         return
     spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for i in range(mission.num_robots):
-        _hull(spec, i).conaffinity |= 1  # meets the scene's geoms, no robot
+        _hull(spec, i).conaffinity |= SCENE_BIT  # meets the scene's geoms, no robot
     for geom in spec.geoms:
         if geom.group == OBSTACLE_GROUP:
             _bounce(geom, mission, priority=1)  # its own contact parameters count
@@ -276,12 +274,15 @@ def _check_unchanged(what: str, before: dict[str, str], after: dict[str, str]) -
 
 
 def _moving_parts(spec: MjSpec) -> list[str]:
-    """Return what a message calls each joint and actuator; one without a name, by its body."""
-    joints = [
-        f"joint {joint.name}" if joint.name else f"a joint to body {joint.parent.name}"
-        for joint in spec.joints
-    ]
-    return joints + [f"actuator {actuator.name}" for actuator in spec.actuators]
+    """Return what a message calls each joint and actuator; no two of them are called alike."""
+    joints = [f"joint {_called(n, joint)}" for n, joint in enumerate(spec.joints)]
+    actuators = [f"actuator {_called(n, each)}" for n, each in enumerate(spec.actuators)]
+    return joints + actuators
+
+
+def _called(n: int, part: MjsJoint | MjsActuator) -> str:
+    """Return the name of the n-th joint or actuator; models need not give them names."""
+    return part.name or f"{n}, which has no name"
 
 
 def _hulls(spec: MjSpec, mission: Mission) -> dict[str, str]:
@@ -311,10 +312,10 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 
 def _motion(spec: MjSpec) -> dict[str, str]:
     """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
-    parts = [(part.name, part) for part in (*spec.joints, *spec.actuators)]
-    parts.append(("option", spec.option))
+    parts = [*spec.joints, *spec.actuators, spec.option]
+    owners = [*_moving_parts(spec), "option"]
     motion: dict[str, str] = {}
-    for owner, part in parts:
+    for owner, part in zip(owners, parts, strict=True):
         for name in MOVING:
             value = getattr(part, name, None)
             if value is not None:

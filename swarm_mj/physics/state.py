@@ -8,7 +8,13 @@ from jaxtyping import Bool, Float, Int
 
 ROBOT_RADIUS_M = 0.5  # assets/robot.xml
 ROBOT_HEIGHT_M = 1.0  # of its centre, and of its antenna, above the floor
-KINDS = SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 2, 3, 4, 5, 6  # as MuJoCo numbers them
+# Kinds of obstacles, as MuJoCo numbers them.
+SPHERE = 2
+CAPSULE = 3
+ELLIPSOID = 4
+CYLINDER = 5
+BOX = 6
+KINDS = (SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,8 +16,8 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.about import Information, Leading, Listed, Look, PairMemory, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.random_access import RandomTransmission
-from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.packets import Packet, fitting, packet_of
+from swarm_mj.protocol.timestamps import slot_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.carrier_sensing import Contention, Sensing, usual_busy_dbm
 

@@ -115,11 +115,10 @@ class LookaheadOracle(CentralisedPolicy):
 
     def _problem(self, b: int, now: float, states: RobotStates) -> Problem:
         """Return the problem of a mission's slot that ends now [slots]."""
-        # A copy, as the arrays are the physics', which may go on to write into them.
-        position_m = states.position_m[b].copy()
+        position_m = states.position_m[b]
         is_active = np.ones(len(position_m), dtype=bool)
         if states.is_active is not None:
-            is_active = states.is_active[b].copy()
+            is_active = states.is_active[b]
         scene = self._scenes[b]
         if scene is None or scene.needs_weights(now, position_m, is_active):
             links = self._links(b, position_m, is_active)

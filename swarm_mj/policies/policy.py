@@ -16,9 +16,10 @@ from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.protocol.window_protocols import DoubleBroadcast, RequestResponse, WindowProtocol
 from swarm_mj.radio.mission_radio import Belief, TrueLinks
+from swarm_mj.system.arguments import check_kind, name_of
 
 LARGEST = 2**63 - 1  # among the parameters: replays keep no larger integer
-Parameters = Mapping[str, bool | int | float | str]  # what a policy was made with, by name
+Parameters = Mapping[str, bool | int | float | str | None]  # what a policy was made with, by name
 
 
 class Policy:
@@ -145,6 +146,21 @@ def check_parameters(policy: Policy) -> None:
             )
 
 
+def packet_by(policy: Policy, mission: Mission) -> Packet:
+    """Return what a policy's packets hold.
+
+    Raises:
+        ValueError: It never fits into a slot, or is no packet.
+        TypeError: It is no policy, or says its parameters wrongly.
+    """
+    check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
+    check_parameters(policy)
+    packet = policy.packet(mission)
+    if not isinstance(packet, Packet):
+        raise ValueError(f"packet() of {name_of(policy)} must return a Packet, not {packet!r:.80}")
+    return packet
+
+
 class DecentralisedPolicy(Policy, ABC):
     """A policy that every robot evaluates on its own view (Eq. 9).
 
@@ -187,7 +203,7 @@ def two_broadcasts(mission: Mission) -> DoubleBroadcast:
     """
     return DoubleBroadcast(
         silence_is_attempt=mission.silence_is_attempt,
-        needs_addressees=mission.half_duplex == "eavesdroppers",
+        needs_addressees=mission.recipient_hears_while_sending,
     )
 
 

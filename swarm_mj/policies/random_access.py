@@ -74,7 +74,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
     @classmethod
     def with_probability(cls, mission: Mission, probability: float) -> "RandomFlooding":
         """Return the policy for a mission, by whose preset packets name an addressee or not."""
-        return cls(probability, names_addressee=mission.half_duplex == "eavesdroppers")
+        return cls(probability, names_addressee=mission.recipient_hears_while_sending)
 
     def __init__(self, probability: float, *, names_addressee: bool = False) -> None:
         """Take the probability of a draw in each slot, and whether packets name an addressee."""

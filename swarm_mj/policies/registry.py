@@ -263,7 +263,7 @@ def about_of(name: str) -> About | None:
 
 
 def is_learned(name: str) -> bool:
-    """Return whether a policy is a trained network: the shipped one, or a stored one."""
+    """Return whether training made a policy: the shipped network, or any file of weights."""
     return name == SHIPPED or is_stored(name)
 
 

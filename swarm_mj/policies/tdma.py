@@ -16,7 +16,7 @@ from swarm_mj.mission.geometry import squared_distance
 from swarm_mj.policies.about import FEW_BYTES, Information, Listed, Look, Textbook
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, slot_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.radio.power_law import PowerLaw, no_powers
@@ -119,6 +119,7 @@ class SpatialTdma(Tdma):
 
     def __init__(self, mission: Mission) -> None:
         """Prepare the policy for the mission's radio, in free space unless informed otherwise."""
+        self._num_robots = mission.num_robots
         self._num_axes = mission.num_axes
         self._range_m = mission.range_m
         self._threshold = from_db(mission.sinr_threshold_db)
@@ -131,10 +132,8 @@ class SpatialTdma(Tdma):
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""
-        law = belief.law
-        if law is not None:
-            law = law._replace(at_1_m=law.at_1_m / belief.radio.noise_mw)
-        self._law = law
+        super().inform(belief)
+        self._law = None if belief.law is None else belief.law_over_noise(self._num_robots)
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:
         """Draw every mission's order, and forget powers; arguments as in `Policy.start`."""
@@ -196,11 +195,6 @@ class SpatialTdma(Tdma):
 def draw_order(num_robots: int, rngs: Sequence[np.random.Generator]) -> Int[np.ndarray, "B N"]:
     """Return a random order for each mission: the robot at each place of it."""
     return np.stack([rng.permutation(num_robots) for rng in rngs])
-
-
-def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
-    """Return the slot that begins now, counted from 0 at the mission's start."""
-    return np.rint(now / SLOT_WINDOWS).astype(np.int64)
 
 
 @compiled()

@@ -57,9 +57,17 @@ class Decay(NamedTuple):
 def perfect_rate(window_s: float) -> float:
     """Return how fast a flock's velocity variance falls that knows itself perfectly [1/window].
 
-    The differences to the mean velocity shrink by 1 - Δt in each window (Eqs. 15 and 16).
+    Each window multiplies the differences to the mean velocity by 1 - Δt (Eqs. 15 and 16): in one
+    of 1 s they are gone, and the rate is inf; beyond, they change sign, and from 2 s on nothing of
+    them goes: 0.
+
+    Args:
+        window_s: Δt, the window's length [s], more than 0.
     """
-    return -2.0 * math.log(1.0 - window_s)
+    left = abs(1.0 - window_s)
+    if left == 0.0:
+        return math.inf
+    return -2.0 * math.log(min(left, 1.0))
 
 
 def perfect_variance(mission: Mission) -> Float[np.ndarray, "T"]:

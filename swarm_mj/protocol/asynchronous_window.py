@@ -6,14 +6,14 @@ themselves in that slot. And it arrives when the responses are already on their 
 punctual packets are answered.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
+from swarm_mj.protocol.buffers import Buffers, copied, merge, observe_self, record_attempt
 from swarm_mj.protocol.partial_buffers import entries_sent
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import Decide, Move, Phase, respondents, transmit
@@ -88,7 +88,7 @@ def _play_slot(
     phase = transmit(states, recipient, channel, t)
     arrivals = channel.split(phase.heard)
     learned_too_late = arrivals.learned_too_late
-    before = _copy(buffers) if np.any(learned_too_late) else None
+    before = copied(buffers) if np.any(learned_too_late) else None
 
     _merge(buffers, arrivals.heard_late, arrivals.late, under_way.written)
     observe_self(buffers, states, t)
@@ -114,24 +114,13 @@ def _merge(
     merge(buffers, heard, sent, written=written)
 
 
-def _copy(buffers: Buffers) -> Buffers:
-    """Return other arrays of T, M and P; what else there is stays the same arrays."""
-    return replace(
-        buffers,
-        timestamp=buffers.timestamp.copy(),
-        position_m=buffers.position_m.copy(),
-        velocity_mps=buffers.velocity_mps.copy(),
-        parent=buffers.parent.copy(),
-    )
-
-
 def _written(
     buffers: Buffers, before: Buffers | None, learned_too_late: Bool[np.ndarray, "B N"]
 ) -> Buffers | None:
     """Return what packets hold: of robots that learned too late, what they knew before."""
     if before is None:
         return None
-    written = _copy(buffers)
+    written = copied(buffers)
     written.timestamp[learned_too_late] = before.timestamp[learned_too_late]
     written.position_m[learned_too_late] = before.position_m[learned_too_late]
     written.velocity_mps[learned_too_late] = before.velocity_mps[learned_too_late]

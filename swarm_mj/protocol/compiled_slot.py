@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from swarm_mj.protocol.buffers import merge_newer, write_attempt, write_own
+from swarm_mj.protocol.buffers import merge_newer, senders_listen, write_attempt, write_own
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import Phase, silence
 from swarm_mj.radio.free_space import decode_strongest
@@ -98,8 +98,20 @@ def record_attempt(
 @compiled()
 def merge(known: KnownArrays, phase: Phase) -> None:
     """Merge whole buffers of senders into those of the robots that heard them."""
+    packets = known
+    if senders_listen(phase.heard):
+        packets = KnownArrays(
+            timestamp=known.timestamp.copy(),
+            believed_m=known.believed_m.copy(),
+            believed_mps=known.believed_mps.copy(),
+            parent=known.parent.copy(),
+            last_attempt=known.last_attempt,
+        )
     merge_newer(
-        sent=known.timestamp,
+        sent_t=packets.timestamp,
+        sent_m=packets.believed_m,
+        sent_mps=packets.believed_mps,
+        sent_parent=packets.parent,
         heard=phase.heard,
         timestamp=known.timestamp,
         believed_m=known.believed_m,

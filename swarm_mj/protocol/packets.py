@@ -119,7 +119,7 @@ def slot_bytes(mission: Mission, taken_s: float = 0.0) -> int | None:
     """
     if mission.bit_rate is None:
         return None
-    bits = mission.bit_rate * (mission.window_s * SLOT_WINDOWS - taken_s)
+    bits = mission.bit_rate * (mission.slot_s - taken_s)
     return math.floor(round(bits / BITS_PER_BYTE, 6))
 
 
@@ -142,7 +142,7 @@ def check_fits_slot(
     rate = mission.bit_rate
     capacity = slot_bytes(mission, taken_s)
     if rate is not None and capacity is not None and packet.num_bytes > capacity:
-        left_s = mission.window_s * SLOT_WINDOWS - taken_s
+        left_s = mission.slot_s - taken_s
         needed = packet.num_bytes * BITS_PER_BYTE / left_s
         least = math.ceil(round(needed, 6))
         raise ValueError(

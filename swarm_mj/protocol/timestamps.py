@@ -6,10 +6,15 @@ Index order: `[i, k]` is when robot `k` observed what robot `i` knows of it.
 import numpy as np
 from jaxtyping import Float, Int
 
+from swarm_mj.mission.team import SLOTS_PER_WINDOW
 from swarm_mj.system.compiled import compiled
 
-SLOTS_PER_WINDOW = 2  # a transmission takes one, and so do its responses
 SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
+
+
+def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
+    """Return the slot that begins now, counted from 0 at the mission's start."""
+    return np.rint(now / SLOT_WINDOWS).astype(np.int64)
 
 
 # The rule of the merge stands here, as a condition and as the rise that follows from it. The loops

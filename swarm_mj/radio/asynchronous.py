@@ -18,7 +18,7 @@ from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.reception import is_received, sinr
 from swarm_mj.system.compiled import compiled
 
-AIRTIME = 0.8  # of a slot
+AIRTIME = 0.8  # of a slot; the bytes of a slot are those of all of it (`packets.slot_bytes`)
 GUARD = 1.0 - AIRTIME
 # Packets overlap those of the slots before and after their own, so three slots are kept.
 BEFORE_LAST = 0

@@ -46,9 +46,7 @@ class Reception(NamedTuple):
     threshold: float  # least SINR that decodes, linear [1]
     rician_k: float = NO_FADING  # 0 is Rayleigh; linear [1]
     erasure: float = 0.0  # probability that a packet is lost on a link, whatever its power [1]
-    burst_begin: float = (
-        0.0  # probability that a receiver stops receiving, per slot (`is_in_burst`)
-    )
+    burst_begin: float = 0.0  # probability per slot that a receiver loses all (`is_in_burst`)
     burst_end: float = 1.0  # that it hears again
     recipient_hears_while_sending: bool = False  # as `FreeSpaceRadio`'s
 

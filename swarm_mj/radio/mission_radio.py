@@ -118,7 +118,7 @@ def radio_of(mission: Mission) -> FreeSpaceRadio:
         noise_mw=from_db(mission.noise_dbm),
         threshold=from_db(mission.sinr_threshold_db),
         frequency_hz=mission.frequency_hz,
-        recipient_hears_while_sending=mission.half_duplex == "eavesdroppers",
+        recipient_hears_while_sending=mission.recipient_hears_while_sending,
     )
 
 

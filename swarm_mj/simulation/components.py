@@ -9,8 +9,7 @@ from typing import Any, TypedDict
 
 from swarm_mj.control.motion import Controller
 from swarm_mj.mission import Mission
-from swarm_mj.physics.robots import CALLED_WITH as CALLED_AS_PILOT
-from swarm_mj.physics.robots import OwnPilot
+from swarm_mj.physics.robots import CALLED_AS_PILOT, OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
 from swarm_mj.radio.free_space import Channel, VaryingChannel
@@ -124,8 +123,9 @@ class Components:
             The components; what was an object is the same object.
 
         Raises:
-            ValueError: One cannot be loaded or made, is not called as its kind is, is a channel
-                that takes the place of effects that the mission asks for, or a pilot of points.
+            ValueError: One cannot be loaded or made, is not called as its kind is, is a channel's
+                name that takes the place of effects that the mission asks for, or a pilot of
+                points. A channel that is an object may take their place: it may hold them itself.
         """
         made = self
         for kind, name in self.given.items():

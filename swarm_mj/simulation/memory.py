@@ -46,19 +46,22 @@ def policy_memory(policy: str, mission: Mission, num_missions: int = 1) -> float
     if is_own_policy(policy):
         load("policy", policy)
     policy = takes_memory_as(policy)
+    robots = (BODY if mission.has_bodies else ROBOT) * mission.num_robots
     if is_learned(policy):
-        return learned_memory(
-            mission.num_robots, num_missions, remembers_packets=remembers_packets(policy)
-        )
+        remembers = remembers_packets(policy)
+        tables = learned_memory(mission.num_robots, num_missions, remembers_packets=remembers)
+        return robots + tables
     about = about_of(policy)
     own_pair = 0.0 if about is None else about.memory.of(mission)
     pairs = num_missions * mission.num_robots**2
-    robot = BODY if mission.has_bodies else ROBOT
-    return LIBRARIES + robot * mission.num_robots + (PAIR + own_pair) * pairs
+    return LIBRARIES + robots + (PAIR + own_pair) * pairs
 
 
 def learned_memory(num_robots: int, num_missions: int, *, remembers_packets: bool) -> float:
-    """Return the memory of missions of N robots that a network flies, with its input [bytes]."""
+    """Return the memory of missions of N robots that a network flies, with its input [bytes].
+
+    MuJoCo's model of these robots is not in it: `policy_memory` adds that.
+    """
     pairs = num_missions * num_robots**2
     remembered = HEARD_ENTRY * num_robots if remembers_packets else 0.0
     return LIBRARIES + TORCH + (LEARNED_PAIR + remembered) * pairs

@@ -1,4 +1,4 @@
-"""The start of missions: where robots begin, and the packets that a policy wants."""
+"""The start of missions: where robots begin."""
 
 from dataclasses import dataclass
 from functools import partial
@@ -11,11 +11,8 @@ from swarm_mj.mission.geometry import PLANE
 from swarm_mj.mission.placement import connected_positions
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.physics.worlds import Worlds
-from swarm_mj.policies.policy import Policy, check_parameters
-from swarm_mj.protocol.packets import Packet
 from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.obstruction import blocked
-from swarm_mj.system.arguments import check_kind, name_of
 
 MAX_DRAWN_AT_ONCE = 1000  # robots of a team that is drawn anew as a whole until it is connected
 
@@ -59,18 +56,3 @@ class Starts:
             overlaps = np.tril(apart_m < needed_m, k=-1)  # the first one may stay
             is_blocked |= np.any(overlaps, axis=1)
         return is_blocked
-
-
-def packet_by(policy: Policy, mission: Mission) -> Packet:
-    """Return what a policy's packets hold.
-
-    Raises:
-        ValueError: It never fits into a slot, or is no packet.
-        TypeError: It is no policy, or says its parameters wrongly.
-    """
-    check_kind("policy", policy, Policy, 'make_policy("planner", mission)')
-    check_parameters(policy)
-    packet = policy.packet(mission)
-    if not isinstance(packet, Packet):
-        raise ValueError(f"packet() of {name_of(policy)} must return a Packet, not {packet!r:.80}")
-    return packet

@@ -19,7 +19,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.physics.worlds import PointWorlds, Worlds
 from swarm_mj.policies.carrier_sense import SensingPolicy
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, Policy, packet_by
 from swarm_mj.protocol.buffers import Buffers, empty_buffers, grant_start, observe_self
 from swarm_mj.protocol.checks import checked_robots
 from swarm_mj.protocol.costs import TaskCost, WindowCosts, window_costs
@@ -34,7 +34,7 @@ from swarm_mj.radio.free_space import Channel, VaryingChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.localisation import Localisation
-from swarm_mj.simulation.starts import Starts, packet_by
+from swarm_mj.simulation.starts import Starts
 from swarm_mj.system.arguments import check_kind
 from swarm_mj.system.user_code import is_ours
 

@@ -45,7 +45,7 @@ def test_streams_that_were_added_later_changed_no_other(seed):
     """A mission's first three streams are those of a seed that spawns no more than three."""
     three = [np.random.default_rng(child) for child in np.random.SeedSequence(seed).spawn(3)]
     streams = [rng for (rng,) in streams_of([seed])]
-    assert len(streams) == 8  # the last are localisation's, sensing's and bodies'
+    assert len(streams) == 9  # the last are localisation's, sensing's, bodies' and pilots'
     for stream, expected in zip(streams[:3], three, strict=True):
         assert stream.random(4).tolist() == expected.random(4).tolist()
     drawn = [rng.random() for rng in (*three, *streams[3:])]

@@ -208,6 +208,32 @@ def test_a_scene_that_changes_how_robots_move_is_refused(part, name, value):
         compose(paper("random-walk", num_robots=3, physics="contact"), scene=meddling)
 
 
+UNNAMED = (
+    '<mujoco><worldbody><body><freejoint/><geom size="0.1" mass="0.2"/>'
+    '<body pos="0 0 0.2"><joint damping="1"/><geom size="0.1" mass="0.2" contype="0"/></body>'
+    '</body></worldbody><actuator><motor site="s"/></actuator></mujoco>'
+).replace("<geom", '<site name="s"/><geom', 1)
+
+
+@pytest.mark.parametrize("i", [0, 1])
+def test_a_scene_may_not_change_joints_without_names(tmp_path, i):
+    """Whichever robot's, of two whose joints are called nothing."""
+    file = tmp_path / "unnamed.xml"
+    file.write_text(UNNAMED)
+    mission = paper("random-walk", num_robots=2, robot=str(file))
+
+    def braking(spec, _mission):
+        spec.joints[2 * i + 1].damping = [5.0, 0.0, 0.0]
+
+    def cutting(spec, _mission):
+        spec.delete(spec.actuators[i])
+
+    with pytest.raises(ValueError, match=f"changed damping of joint {2 * i + 1}, which has no"):
+        compose(mission, scene=braking)
+    with pytest.raises(ValueError, match="removes or renames actuator 1, which has no name"):
+        compose(mission, scene=cutting)
+
+
 def test_a_scene_cannot_switch_the_solver_s_parts_off():
     def without_limits(spec, _mission):
         spec.option.disableflags |= int(mujoco.mjtDisableBit.mjDSBL_LIMIT)

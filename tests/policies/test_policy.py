@@ -9,7 +9,7 @@ import pytest
 from swarm_mj.mission import paper, reference
 from swarm_mj.policies.carrier_sense import SensingPolicy
 from swarm_mj.policies.centralised import MinimumSpanningTree
-from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy
+from swarm_mj.policies.policy import CentralisedPolicy, DecentralisedPolicy, packet_by
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
 from swarm_mj.policies.registry import LISTED, POLICIES, make_policy
 from swarm_mj.protocol.packets import PacketField
@@ -207,3 +207,13 @@ def test_a_bad_probability_is_a_clear_error(kind, probability):
     options = {"range_m": 1.0} if kind is Aloha else {}
     with pytest.raises(ValueError, match=f"probability must be from 0 to 1, not {probability!r}"):
         kind(probability, **options)
+
+
+def test_a_packet_is_what_the_policy_says_and_must_be_one():
+    policy = make_policy("tdma", MISSION)
+    assert packet_by(policy, MISSION) == policy.packet(MISSION)
+    policy.packet = lambda _mission: 66
+    with pytest.raises(ValueError, match="must return a Packet, not 66"):
+        packet_by(policy, MISSION)
+    with pytest.raises(TypeError, match="policy"):
+        packet_by("tdma", MISSION)

@@ -97,6 +97,18 @@ def test_perfect_knowledge_takes_a_tenth_of_the_spread_in_a_window():
     assert math.exp(-perfect_rate(0.1)) == pytest.approx(0.81)
 
 
+@pytest.mark.parametrize(
+    ("window_s", "left"), [(0.5, 0.25), (1.0, 0.0), (1.5, 0.25), (2.0, 1.0), (10.0, 1.0)]
+)
+def test_perfect_knowledge_in_long_windows_by_hand(window_s, left):
+    """Half of each difference is left after 0.5 s, and as much of the other sign after 1.5 s."""
+    assert math.exp(-perfect_rate(window_s)) == pytest.approx(left)
+    mission = paper("flocking", num_robots=4, num_windows=2, window_s=window_s)
+    found = perfect_variance(mission)
+    start = 2.0 * mission.max_velocity_mps**2 / 3.0 * 0.75
+    np.testing.assert_allclose(found, [start * left, start * left**2], atol=1e-12)
+
+
 def test_perfect_knowledge_leaves_81_percent_of_the_variance_in_each_window_by_hand():
     """Of 4 robots within 3 m/s: 2 axes of 3² / 3 each, of which 3/4 is about the team's mean."""
     mission = paper("flocking", num_robots=4, num_windows=3, velocity_ratio=0.15)

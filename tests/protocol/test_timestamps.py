@@ -5,8 +5,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from swarm_mj.mission import paper
 from swarm_mj.protocol.buffers import empty_buffers, merge
-from swarm_mj.protocol.timestamps import merge_expected, merge_timestamps
+from swarm_mj.protocol.timestamps import merge_expected, merge_timestamps, slot_of
+
+
+def test_a_window_has_two_slots_counted_from_0():
+    now = np.array([0.0, 0.5, 7.0, 7.5])
+    assert slot_of(now).tolist() == [0, 1, 14, 15]
+    assert paper(window_s=0.3).slot_s == 0.15
 
 
 def random_slot(seed, num_robots):

@@ -130,7 +130,8 @@ def test_one_robots_silence_changes_no_other_links_fade():
     position_m, recipient = scenes(5, 40)
     position_m[:, 0] = 1e7  # so far off that nobody notices its packets
     heard = []
-    for recipient[:, 0] in (0, -1):
+    for silent_or_broadcasting in (0, -1):
+        recipient[:, 0] = silent_or_broadcasting
         heard.append(heard_in(6, made, position_m, recipient)[:, 1:])
     np.testing.assert_array_equal(heard[0], heard[1])
 

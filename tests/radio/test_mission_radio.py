@@ -24,6 +24,8 @@ def test_radio_is_the_missions():
     assert radio.noise_mw == pytest.approx(1e-5)
     assert radio.threshold == pytest.approx(10**0.1)
     assert not radio.recipient_hears_while_sending
+    assert not paper().recipient_hears_while_sending
+    assert reference().recipient_hears_while_sending
     assert radio_of(reference()).recipient_hears_while_sending
 
 

@@ -1,16 +1,14 @@
-"""Where robots may begin: beside walls and each other, by hand; and what packets must be."""
+"""Where robots may begin: beside walls and each other, by hand."""
 
 from dataclasses import replace
 
 import numpy as np
-import pytest
 from walls import walls
 
 from swarm_mj.mission import paper
 from swarm_mj.physics.state import ROBOT_RADIUS_M
 from swarm_mj.physics.worlds import PointWorlds
-from swarm_mj.policies.registry import make_policy
-from swarm_mj.simulation.starts import Starts, packet_by
+from swarm_mj.simulation.starts import Starts
 
 MISSION = paper(num_robots=3)
 
@@ -47,13 +45,3 @@ def test_a_team_begins_connected_within_its_area():
 def test_obstacles_are_in_the_way():
     wall = walls(0.1, 0)
     assert starts(obstacles=wall).is_blocked(wall.centre_m[:1, :2]).tolist() == [True]
-
-
-def test_a_packet_is_what_the_policy_says_and_must_be_one():
-    policy = make_policy("tdma", MISSION)
-    assert packet_by(policy, MISSION) == policy.packet(MISSION)
-    policy.packet = lambda _mission: 66
-    with pytest.raises(ValueError, match="must return a Packet, not 66"):
-        packet_by(policy, MISSION)
-    with pytest.raises(TypeError, match="policy"):
-        packet_by("tdma", MISSION)

@@ -16,7 +16,7 @@ MOST_SENSED_DB = 6.0  # that features may add to the usual shift, or take from i
 # were trained on may never begin.
 MOST_SILENCE = 2.0  # [octaves]
 RECENT = 0.1  # share of the last slot in the shares of slots of late
-LEAST = 1e-9  # has a logarithm, where nothing is
+TINY = 1e-9  # is added to what may be 0, which has no logarithm
 
 
 class Record(NamedTuple):
@@ -86,7 +86,7 @@ def decide(
             _remember(record, b, i, total, has_sent[b, i], has_decoded[b, i], covered[b, i])
             features = _features(record, gain, b, i, now[b] - total / num_robots)
             pairs = num_robots * max(1.0, gain.neighbours[b, i])
-            octave = np.log2(gain.total[b, i] / pairs + LEAST)
+            octave = np.log2(gain.total[b, i] / pairs + TINY)
             index = octave
             silence = 0.0
             sensing_db = 0.0
@@ -99,7 +99,7 @@ def decide(
             minislot[b, i] = min(max(share, 0.0), 1.0)
             silence = min(max(silence, -MOST_SILENCE), MOST_SILENCE)
             # A logistic draw: robots with a little too little transmit at times.
-            odds = np.log(drawn[b, 1, i] + LEAST) - np.log(1.0 - drawn[b, 1, i] + LEAST)
+            odds = np.log(drawn[b, 1, i] + TINY) - np.log(1.0 - drawn[b, 1, i] + TINY)
             over = octave - weights.threshold[b, 0] + silence + weights.softness[b, 0] * odds
             if record.has_sent[b, i] and over <= 0.0:
                 minislot[b, i] = np.inf

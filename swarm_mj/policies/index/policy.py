@@ -22,9 +22,9 @@ from swarm_mj.policies.index.table import MAX_ROWS, empty_gain, empty_table, not
 from swarm_mj.policies.index.weights import NUM_SHIFTS, Weights, flat, repeated
 from swarm_mj.policies.learned import DIGITS
 from swarm_mj.policies.policy import Parameters
-from swarm_mj.policies.tdma import slot_of
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.partial_buffers import choose_entries
+from swarm_mj.protocol.timestamps import slot_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.carrier_sensing import Contention, usual_busy_dbm
 

@@ -19,7 +19,7 @@ from swarm_mj.system.compiled import compiled
 
 MAX_ROWS = 32  # a robot's; of more neighbours, those without a row count as those with one
 NO_ROW = -1
-NOBODY = -1
+NO_NEIGHBOUR = -1
 MIDDLE = 0.5  # of `Around.edge`, of a robot that knows nobody
 # A link's chance falls from 1 to 0 around the learned distance by this logistic scale, and so does
 # the chance that a neighbour decoded a packet that the robot did [ranges].
@@ -34,7 +34,7 @@ KNOWS_ITSELF = np.float32(np.inf)  # in a neighbour's row, of the neighbour itse
 class Table(NamedTuple):
     """The notes of every robot on its neighbours, in B missions."""
 
-    neighbour: Int16[np.ndarray, "B N R"]  # whose row it is, or NOBODY
+    neighbour: Int16[np.ndarray, "B N R"]  # whose row it is, or NO_NEIGHBOUR
     row: Int8[np.ndarray, "B N N"]  # which row a robot has, or NO_ROW
     bound: Float32[np.ndarray, "B N R N"]  # the neighbour's T, as estimated [windows]
     announced: Float32[np.ndarray, "B N N"]  # greatest T in the robot's own packets [windows]
@@ -64,7 +64,7 @@ def empty_table(num_missions: int, num_robots: int) -> Table:
     num_rows = min(MAX_ROWS, num_robots - 1)
     robots = (num_missions, num_robots)
     return Table(
-        neighbour=np.full((*robots, num_rows), NOBODY, dtype=np.int16),
+        neighbour=np.full((*robots, num_rows), NO_NEIGHBOUR, dtype=np.int16),
         row=np.full((*robots, num_robots), NO_ROW, dtype=np.int8),
         bound=np.zeros((*robots, num_rows, num_robots), dtype=np.float32),
         announced=np.zeros((*robots, num_robots), dtype=np.float32),
@@ -79,7 +79,7 @@ def empty_gain(num_missions: int, num_robots: int) -> Gain:
 
 
 @compiled(makes_arrays=False)
-def chance(ranges: float, half_at: float, scale: float) -> float:
+def chance_within(ranges: float, half_at: float, scale: float) -> float:
     """Return the chance of a link over a distance: one half at `half_at`, all in ranges."""
     steps = (half_at - ranges) / scale
     if steps > 12.0:
@@ -195,7 +195,7 @@ def _note_decoded(
     """Note T of a packet that a robot decoded, and that its neighbours near the sender did, too."""
     for r in range(table.neighbour.shape[2]):
         j = table.neighbour[b, i, r]
-        if j == NOBODY:
+        if j == NO_NEIGHBOUR:
             continue
         if j == sender:
             _copy_entries(said, j, table.bound[b, i, r])
@@ -205,7 +205,7 @@ def _note_decoded(
         )
         if position_m.shape[1] > PLANE:
             apart_m = np.hypot(apart_m, position_m[j, 2] - position_m[sender, 2])
-        share = chance(apart_m / range_m, shared, SHARED_SCALE)
+        share = chance_within(apart_m / range_m, shared, SHARED_SCALE)
         if share > LEAST_CHANCE:
             raise_bound(table.bound[b, i, r], said, np.float32(share))
 
@@ -224,9 +224,9 @@ def _note_sent(
         table.announced[b, i, k] = max(table.announced[b, i, k], said[k])
     for r in range(table.neighbour.shape[2]):
         j = table.neighbour[b, i, r]
-        if j == NOBODY:
+        if j == NO_NEIGHBOUR:
             continue
-        if chance(float(ranges[j]), weights.reach[b, 0], REACH_SCALE) > LEAST_CHANCE:
+        if chance_within(float(ranges[j]), weights.reach[b, 0], REACH_SCALE) > LEAST_CHANCE:
             # The same for all in reach: with a link's chance, robots would transmit for ever to
             # those at the edge of it.
             raise_bound(table.bound[b, i, r], said, np.float32(weights.success[b, 0]))
@@ -241,9 +241,9 @@ def _weigh(table: Table, gain: Gain, b: int, i: int, around: Around, weights: We
     largest = 0.0
     for r in range(table.neighbour.shape[2]):
         j = table.neighbour[b, i, r]
-        if j == NOBODY:
+        if j == NO_NEIGHBOUR:
             continue
-        link = chance(float(table.ranges[j]), weights.reach[b, 0], REACH_SCALE)
+        link = chance_within(float(table.ranges[j]), weights.reach[b, 0], REACH_SCALE)
         if link > LEAST_CHANCE:
             part = link * lacking(table.own, table.bound[b, i, r])
             brought += part
@@ -293,7 +293,7 @@ def _look_around(
         if position_m.shape[1] > PLANE:  # an edge is one in the plane, but packets rise
             ranges[j] = np.hypot(ranges[j], (position_m[j, 2] - position_m[i, 2]) / range_m)
         if ranges[j] < TAKEN_WITHIN:
-            neighbours += chance(ranges[j], reach, REACH_SCALE)
+            neighbours += chance_within(ranges[j], reach, REACH_SCALE)
     edge = MIDDLE
     if sum_ranges > 0.0:
         edge = np.sqrt(sum_x * sum_x + sum_y * sum_y) / sum_ranges
@@ -307,9 +307,9 @@ def _leave_rows(
     """Take their rows from those who are too far away by now."""
     for r in range(len(neighbour)):
         j = neighbour[r]
-        if j != NOBODY and ranges[j] > LEFT_BEYOND:
+        if j != NO_NEIGHBOUR and ranges[j] > LEFT_BEYOND:
             row[j] = NO_ROW
-            neighbour[r] = NOBODY
+            neighbour[r] = NO_NEIGHBOUR
 
 
 @compiled(makes_arrays=False)
@@ -323,10 +323,10 @@ def _take_rows(
 ) -> None:
     """Give free rows to those near who have none, the nearest first."""
     for r in range(len(neighbour)):
-        if neighbour[r] != NOBODY:
+        if neighbour[r] != NO_NEIGHBOUR:
             continue
         j = _nearest_without(row, ranges)
-        if j == NOBODY:
+        if j == NO_NEIGHBOUR:
             return
         neighbour[r] = j
         row[j] = r
@@ -340,10 +340,10 @@ def _take_rows(
 
 @compiled(makes_arrays=False)
 def _nearest_without(row: Int8[np.ndarray, "N"], ranges: Float[np.ndarray, "N"]) -> int:
-    """Return the nearest robot that may have a row and has none, or NOBODY."""
-    nearest = NOBODY
+    """Return the nearest robot that may have a row and has none, or NO_NEIGHBOUR."""
+    nearest = NO_NEIGHBOUR
     for j in range(len(ranges)):
         may_have = row[j] == NO_ROW and ranges[j] < TAKEN_WITHIN
-        if may_have and (nearest == NOBODY or ranges[j] < ranges[nearest]):
+        if may_have and (nearest == NO_NEIGHBOUR or ranges[j] < ranges[nearest]):
             nearest = j
     return nearest

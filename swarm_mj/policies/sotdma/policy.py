@@ -92,7 +92,7 @@ class SelfOrganisedTdma(BroadcastPolicy):
         # Packets say whom their senders heard only if they hold all of T and P as before the slot.
         # By the authors' rule a robot may decode while it transmits, which changes its T in it.
         is_whole = fits(packet_of(mission), mission)
-        self._reads_packets = is_whole and mission.half_duplex == "strict"
+        self._reads_packets = is_whole and not mission.recipient_hears_while_sending
 
     def inform(self, belief: Belief) -> None:
         """Take the powers that robots believe in."""

@@ -9,7 +9,7 @@ from swarm_mj.policies.index.table import (
     MAX_ROWS,
     NO_ROW,
     TAKEN_WITHIN,
-    chance,
+    chance_within,
     empty_gain,
     empty_table,
     lacking,
@@ -142,7 +142,7 @@ def test_what_a_robot_sent_came_to_neighbours_for_the_learned_share():
 def test_the_gain_is_what_all_in_reach_lack():
     """Half a range away links are certain, and a range away their chance is a logistic's."""
     robots = team()
-    far = chance(1.0, WEIGHTS.reach[0, 0], 0.067)
+    far = chance_within(1.0, WEIGHTS.reach[0, 0], 0.067)
     assert 0.5 < far < 1.0
     # Each neighbour lacks 4 windows of the robot itself and 4 of the third.
     assert robots.gain.total[0].tolist() == pytest.approx(
