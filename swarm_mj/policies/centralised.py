@@ -85,7 +85,7 @@ class MinimumSpanningTree(RandomTransmission, CentralisedPolicy):
         rank=30,
         uses=(
             "the true positions at the start (moving teams of --preset reference: in each window): "
-            "a robot talks to its parent in their spanning tree"
+            "a robot talks to its parent in their spanning tree, with probability p"
         ),
         beyond=(),
         payload=None,

@@ -64,7 +64,7 @@ class RandomFlooding(RandomTransmission, BroadcastPolicy):
         name="random-flooding",
         origin=FromPaper(section="IV-C"),
         rank=10,
-        uses="nothing: it transmits with probability p",
+        uses="only the size of the team: it transmits with probability p (N - 1) / N",
         beyond=(),
         payload=None,
         look=Look(label="random-flooding", colour="#e69f00", marker="o"),
