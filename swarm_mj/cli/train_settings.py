@@ -31,7 +31,7 @@ from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
     check_named,
-    has_turns,
+    gives_turns,
     is_own_set,
     load_features,
     num_features,
@@ -179,7 +179,7 @@ def _usual_silence(own: Given, training: Training) -> Given:
     """Return the logit of silence that suits features with an order of turns, if these are such."""
     features = own["features"]
     is_ours = features in FEATURE_SETS  # only a user knows what the own ones say
-    if training.credit_assignment == "robot" and is_ours and has_turns(features):
+    if training.credit_assignment == "robot" and is_ours and gives_turns(features):
         return {"silence_logit": ORDERLY_SILENCE}
     return {}
 
