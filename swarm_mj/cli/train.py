@@ -1,4 +1,4 @@
-"""`swarm-mj train`: trains a communication policy by PPO in simulated missions."""
+"""`swarm-mj train`: trains a network by PPO, or an index by evolution, in missions."""
 
 import shlex
 from collections.abc import Callable

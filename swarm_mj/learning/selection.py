@@ -162,7 +162,7 @@ class Progress:
     next_replay: int = 0  # team decisions
     curve: list[CurveRow] = field(default_factory=list)
     since_evaluation: Accumulator = field(default_factory=Accumulator)
-    optimiser: Columns = field(default_factory=dict)  # what PPO last logged of itself
+    optimiser: Columns = field(default_factory=dict)  # what the optimiser last said of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
     evaluation_minutes: float = 0.0  # that the last one took
     references: References = field(default_factory=dict)  # flown once; none in runs of 1.0.0

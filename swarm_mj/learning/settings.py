@@ -217,7 +217,7 @@ class Training:
         seed: The same seed is the same policy.
         evaluate_every: Team decisions between two evaluations.
         held_out: Missions of an evaluation, of each kind.
-        components: Channel, controller and scene, where they are not the mission's own.
+        components: Parts that are not the mission's own: see `Components`.
         threads: Torch's threads.
 
     Raises:

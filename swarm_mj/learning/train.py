@@ -1,4 +1,4 @@
-"""The training run (III-C): PPO's loop from an empty folder or a checkpoint to a stored policy."""
+"""The training run (III-C), from an empty folder or a checkpoint to a policy; PPO's session."""
 
 from collections.abc import Callable
 from dataclasses import asdict
