@@ -107,7 +107,7 @@ def asked_settings(
     `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
     own = _part("", given)
-    if own.get("policy") == IndexCsma.NAME:
+    if are_of_index(given):
         return _index_settings(given)
     network = _part("network", given)
     ppo = _part("ppo", given)
@@ -144,6 +144,11 @@ def asked_settings(
         rule = "reward velocity-variance depends on who talks only if the robots flock"
         raise ValueError(f"{rule}; add --task flocking")
     return training
+
+
+def are_of_index(given: Given) -> bool:
+    """Return whether options ask for an index."""
+    return given.get("policy") == IndexCsma.NAME
 
 
 def _index_settings(given: Given) -> Training:
