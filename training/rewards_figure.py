@@ -134,10 +134,10 @@ def draw(trained: Sequence[Trained]) -> Figure:
 
 def table(folder: Path) -> str:
     """Return how the trainings on either reward end and fly, as Markdown."""
-    lines = [["median (least to greatest) of 8 trainings"]]
+    age, variance = read_curves(CURVES)
+    lines = [[f"median (least to greatest) of {len(age.aoi)} trainings"]]
     lines[0] += ["trained on the age", "on the velocity variance", "p"]
     lines.append(["---"] * len(lines[0]))
-    age, variance = read_curves(CURVES)
     for cost in COSTS:
         last = (each.of(cost)[:, -1] for each in (age, variance))
         lines.append(_row(f"{cost.title}, at the end of training", *last))
