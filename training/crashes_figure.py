@@ -25,6 +25,7 @@ from swarm_mj.evaluation.figures.style import (
     styled,
     write_caption,
 )
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import Result, config_of
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.system.fields import setting
@@ -140,9 +141,7 @@ def table(folder: Path) -> str:
         for each in at_density(found, density_per_km2):
             mean, worst = crashed(each)
             cells[_name(each)] += [f"{news_age(each):.1f}", f"{mean:.1f} ({worst:.0f})"]
-    rows = [head, ["---"] * len(head)]
-    rows += [[name, *its] for name, its in cells.items()]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_table(head, [[name, *its] for name, its in cells.items()])
 
 
 def _name(result: Result) -> str:

@@ -21,6 +21,7 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
 from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.missions_table import read_missions
 from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.evaluation.results import Result
@@ -145,9 +146,8 @@ def table(folder: Path) -> str:
     searched = _steady(folder / "ceiling.csv", SEARCHED, ratios)
     planner = _steady(folder / "paper-stationary.csv", PLANNER, ratios)
     both = list(zip(searched, planner, strict=True))
+    head = ["range ratio", *(f"{ratio:g}" for ratio in ratios)]
     rows = [
-        ["range ratio", *(f"{ratio:g}" for ratio in ratios)],
-        ["---"] * (len(ratios) + 1),
         ["proven floor", *(f"{age:.2f}" for age in floor.mean)],
         ["searched schedule, steady state", *map(_age, searched)],
         [f"`{PLANNER}`, steady state", *map(_age, planner)],
@@ -157,7 +157,7 @@ def table(folder: Path) -> str:
         ],
         ["searched schedule / planner", *(f"{its.mean / ours.mean:.2f}" for its, ours in both)],
     ]
-    return _markdown(rows)
+    return markdown_table(head, rows)
 
 
 def oracles_table(folder: Path) -> str:
@@ -169,7 +169,7 @@ def oracles_table(folder: Path) -> str:
     heads = []
     for label, _, _ in costs:
         heads += [f"{label}, `{LOOKAHEAD}`", f"`{GREEDY}`", "difference"]
-    rows = [["missions", *heads], ["---"] * (len(heads) + 1)]
+    rows: list[list[str]] = []
     for compared in COMPARED:
         row = [compared.head]
         for _, column, digits in costs:
@@ -178,7 +178,7 @@ def oracles_table(folder: Path) -> str:
             else:
                 row += [""] * 3
         rows.append(row)
-    return _markdown(rows)
+    return markdown_table(["missions", *heads], rows)
 
 
 def _both(compared: Compared, folder: Path, column: str, digits: int) -> list[str]:
@@ -232,24 +232,17 @@ def _age(age: _Age) -> str:
 def exact_table(folder: Path) -> str:
     """Return floor and optimum of small teams, as Markdown for docs/bounds.md."""
     teams = [row for _, row in read_rows(folder / "exact.csv", "table of optima", MOST_BYTES)]
-    rows = [
-        ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]", "floor / optimum"]
-    ]
-    rows.append(["---"] * len(rows[0]))
+    head = ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]"]
+    head.append("floor / optimum")
+    rows: list[list[str]] = []
     for team in teams:
-        floor, optimum, ratio = (
-            float(team[name]) for name in ("floor_windows", "optimum_windows", "ratio")
-        )
+        floor = float(team["floor_windows"])
+        optimum = float(team["optimum_windows"])
+        ratio = float(team["ratio"])
         rows.append([team["team"], f"{floor:.3f}", f"{optimum:.3f}", f"{ratio:.2f}"])
     commits = " and ".join(sorted({team["commit"] for team in teams}))
-    return (
-        f"{_markdown(rows)}\n\n*From `exact`; commit {commits}. `make results STUDIES=floor` "
-        "computes them again.*"
-    )
-
-
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    again = "`make results STUDIES=floor` computes them again."
+    return f"{markdown_table(head, rows)}\n\n*From `exact`; commit {commits}. {again}*"
 
 
 def draw_limits(

@@ -85,10 +85,11 @@ def draw(results: Sequence[Result]) -> Figure:
 
 def better(theirs: Sequence[Curve]) -> Curve:
     """Return the lowest of curves over the same x at each, as one."""
-    mean, sem = (np.stack([getattr(curve, of) for curve in theirs]) for of in ("mean", "sem"))
-    lowest = np.argmin(mean, axis=0)[None]
-    mean, sem = (np.take_along_axis(values, lowest, axis=0)[0] for values in (mean, sem))
-    return replace(theirs[0], method=BETTER, mean=mean, sem=sem)
+    mean = np.stack([curve.mean for curve in theirs])
+    sem = np.stack([curve.sem for curve in theirs])
+    lowest = np.argmin(mean, axis=0)
+    at = np.arange(len(lowest))
+    return replace(theirs[0], method=BETTER, mean=mean[lowest, at], sem=sem[lowest, at])
 
 
 if __name__ == "__main__":

@@ -22,6 +22,7 @@ from scipy.stats import mannwhitneyu
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import method_of
 from swarm_mj.evaluation.figures.style import look_of, panels, save, styled, write_caption
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.system.fields import setting
@@ -135,9 +136,9 @@ def draw(trained: Sequence[Trained]) -> Figure:
 def table(folder: Path) -> str:
     """Return how the trainings on either reward end and fly, as Markdown."""
     age, variance = read_curves(CURVES)
-    lines = [[f"median (least to greatest) of {len(age.aoi)} trainings"]]
-    lines[0] += ["trained on the age", "on the velocity variance", "p"]
-    lines.append(["---"] * len(lines[0]))
+    head = [f"median (least to greatest) of {len(age.aoi)} trainings"]
+    head += ["trained on the age", "on the velocity variance", "p"]
+    lines: list[list[str]] = []
     for cost in COSTS:
         last = (each.of(cost)[:, -1] for each in (age, variance))
         lines.append(_row(f"{cost.title}, at the end of training", *last))
@@ -147,7 +148,7 @@ def table(folder: Path) -> str:
         for cost in COSTS:
             flown = [_flown(folder / FLIGHTS, REWARDS[name], ratio, cost) for name in REWARDS]
             lines.append(_row(f"{cost.title} of the policies kept, velocity {ratio:g}", *flown))
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(head, lines)
 
 
 def _swings(values: Float[np.ndarray, "S E"]) -> Float[np.ndarray, "S"]:
