@@ -19,14 +19,14 @@ from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import PERFECT
-from swarm_mj.evaluation.figures.style import FAINT, look_of, save, styled, write_caption
+from swarm_mj.evaluation.figures.style import FAINT, draw_to, look_of, styled, write_caption
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Mission, paper
 from swarm_mj.protocol.agreement import AGREED, perfect_variance
 from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 COURSES = "converging-courses.csv"
@@ -55,12 +55,8 @@ class ConvergenceFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw(read_courses(self.results / COURSES), paper("flocking"))
-        for path in paths:
-            save(figure, path)
-        return 0
+        draw_to(self.out, lambda: draw(read_courses(self.results / COURSES), paper("flocking")))
+        return DONE
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -24,7 +24,9 @@ from swarm_mj.evaluation.figures.style import code, look_of, save, styled, write
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import Result, config_of
 from swarm_mj.evaluation.results_files import read_results
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
+from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results"
@@ -59,8 +61,9 @@ class ImpairmentsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
+        check_outputs(Output("figure", self.out, ".png"))
         save(draw(read_results(RESULTS / FILE)), self.out)
-        return 0
+        return DONE
 
 
 def impairment(result: Result) -> str:

@@ -19,12 +19,13 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
-from swarm_mj.evaluation.figures.style import FAINT, save
+from swarm_mj.evaluation.figures.style import FAINT, draw_to
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.published import TEAM_SIZE
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.protocol.mission_costs import AOI
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -46,10 +47,8 @@ class LargeTeamsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        found = read(ROOT / "training" / "results")
-        for kind in ("svg", "png"):
-            save(draw(found), self.out.with_name(f"{self.out.name}.{kind}"))
-        return 0
+        draw_to(self.out, lambda: draw(read(ROOT / "training" / "results")))
+        return DONE
 
 
 def read(folder: Path) -> list[Result]:

@@ -20,16 +20,16 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
-from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.figures.style import draw_to
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.missions_table import read_missions
 from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.evaluation.samples import standard_error
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_BYTES = 10_000_000
@@ -103,16 +103,15 @@ class LimitsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw_limits(
+        draw_to(self.out, self._draw)
+        return DONE
+
+    def _draw(self) -> Figure:
+        return draw_limits(
             read_results(self.results / "paper-stationary.csv"),
             read_results(self.results / "ceiling.csv"),
             *read_floor(self.results / "floor.csv"),
         )
-        for path in paths:
-            save(figure, path)
-        return 0
 
 
 def read_floor(path: Path) -> tuple[Curve, str]:

@@ -21,13 +21,13 @@ from scipy.stats import mannwhitneyu
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import method_of
-from swarm_mj.evaluation.figures.style import look_of, panels, save, styled, write_caption
+from swarm_mj.evaluation.figures.style import draw_to, look_of, panels, styled, write_caption
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 CURVES = ROOT / "training" / "reproduce" / "quick" / "rewards" / "curves.csv"
@@ -58,12 +58,8 @@ class RewardsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw(read_curves(self.curves))
-        for path in paths:
-            save(figure, path)
-        return 0
+        draw_to(self.out, lambda: draw(read_curves(self.curves)))
+        return DONE
 
 
 @dataclass(frozen=True, kw_only=True)
