@@ -73,7 +73,7 @@ class Trained:
 
     def of(self, cost: MissionCost) -> Float[np.ndarray, "S E"]:
         """Return the values of a cost."""
-        return self.aoi if cost == AOI else self.velocity_variance
+        return getattr(self, cost.column)
 
 
 def read_curves(path: Path) -> list[Trained]:
