@@ -86,8 +86,11 @@ def curve_row_of(row: Mapping[str, float]) -> CurveRow:
     references: Columns = {}
     training: Columns = {}
     for name, value in left.items():
-        # A slash makes a group in TensorBoard, which is where these two kinds come from.
-        (training if "/" in name else references)[name] = value
+        # A slash makes a group in TensorBoard, which is where what is of training goes.
+        if "/" in name:
+            training[name] = value
+        else:
+            references[name] = value
     return CurveRow(
         decisions=decisions,
         minutes=minutes,
@@ -247,7 +250,7 @@ def reached(curve: Sequence[CurveRow], name: str) -> CurveRow | None:
 
 def behind_column(name: str) -> str:
     """Return the curve's column for how much older than one of `COMPARED` a policy's news is."""
-    return column(AOI, f"behind {name}".replace(" ", "_"))
+    return column(AOI, f"behind_{name}")
 
 
 def references_flown(training: Training) -> list[str]:
