@@ -239,7 +239,6 @@ def test_the_core_does_not_load_heavy_libraries(core, heavy):
 # Modules without a test file of their own, and where their tests stand.
 ELSEWHERE = {
     "__main__": "system/test_without_posix.py",
-    "learning/session": "learning/test_train.py",
     "mission/conventions": "mission/test_specification.py",
     "mission/dynamics": "mission/test_specification.py",
     "mission/faults": "mission/test_specification.py",

@@ -6,6 +6,7 @@ It is made from what policies declare, as `swarm-mj policies NAME` says it.
 from collections.abc import Iterator
 from pathlib import Path
 
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import paper
 from swarm_mj.policies.about import About, Information
 from swarm_mj.policies.registry import LISTED, SHIPPED, WITHOUT_PAYLOAD, make_policy
@@ -20,14 +21,13 @@ def table(_folder: Path | None = None) -> str:
     No result is in it, whatever the folder of the results.
     """
     columns = list(dict.fromkeys(_column(kind) for kind in Information))
-    rows = [["policy", *columns], ["---"] * (len(columns) + 1)]
+    rows: list[list[str]] = []
     for row, about in _rows():
         marks = {_column(kind): MARKS.get(kind, "yes") for kind in about.beyond}
         cells = [marks.get(column, "") for column in columns]
         rows.append([row, *cells])
-    lines = [f"| {' | '.join(row)} |" for row in rows]
     sentences = [f"- **{_label(kind)}**: {kind.sentence}" for kind in Information]
-    return "\n".join([*lines, "", *sentences])
+    return "\n".join([markdown_table(["policy", *columns], rows), "", *sentences])
 
 
 def _rows() -> Iterator[tuple[str, About]]:

@@ -5,6 +5,7 @@ import re
 from pathlib import Path
 
 from swarm_mj.cli.mission_options import FLAGS
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.radio.effect import MissionEffect
 from swarm_mj.radio.effects import EFFECTS
 
@@ -14,8 +15,7 @@ HEADS = ("effect", "options", "model")
 def table(_folder: Path, /) -> str:
     """Return the list as Markdown; no results are in it."""
     rows = [(_name(effect), _options(effect), _model(effect)) for effect in EFFECTS]
-    lines = [HEADS, ("---", "---", "---"), *rows]
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(HEADS, rows)
 
 
 def _name(effect: type[MissionEffect]) -> str:

@@ -11,6 +11,7 @@ import numpy as np
 from results_rows import PAPER, Row, Rows, read, select
 from scipy.stats import spearmanr
 
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.system.reading import read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -35,29 +36,24 @@ class Margin:
 
 def margins(folder: Path) -> str:
     """Return the GNNs' margins over the best baseline, here and as published (Fig. 4)."""
-    rows = [["margin over the best baseline, by range ratio [km]", *map(_short, RANGE_RATIOS)]]
+    head = ["margin over the best baseline, by range ratio [km]", *map(_short, RANGE_RATIOS)]
+    rows: list[list[str]] = []
     for whose, ours, gnns, theirs in (
         ("ours", ["reproduce/quick/one"], OURS, ["paper-stationary"]),
         ("published", [PAPER], ["GNN"], [PAPER]),
     ):
-        found = [
-            margin(
+        in_windows = [f"{whose} [windows]"]
+        in_percent = [f"{whose} [%]"]
+        for ratio in RANGE_RATIOS:
+            place = {"task": "stationary", "range_ratio": ratio, "figure": ["fig4", "none"]}
+            found = margin(
                 select(read(ours, folder), {"policy": gnns} | place),
                 select(read(theirs, folder), {"policy": BASELINES} | place),
             )
-            for ratio in RANGE_RATIOS
-            for place in [{"task": "stationary", "range_ratio": ratio, "figure": ["fig4", "none"]}]
-        ]
-        rows.append(
-            [f"{whose} [windows]", *(f"{m.windows:.1f} ± {m.windows_sem:.1f}" for m in found)]
-        )
-        rows.append(
-            [
-                f"{whose} [%]",
-                *(f"{m.share:.0%} ± {m.share_sem:.0%}".replace("%", "") for m in found),
-            ]
-        )
-    return _markdown(rows)
+            in_windows.append(f"{found.windows:.1f} ± {found.windows_sem:.1f}")
+            in_percent.append(f"{100.0 * found.share:.0f} ± {100.0 * found.share_sem:.0f}")
+        rows += [in_windows, in_percent]
+    return markdown_table(head, rows)
 
 
 def margin(gnns: Rows, baselines: Rows) -> Margin:
@@ -68,7 +64,8 @@ def margin(gnns: Rows, baselines: Rows) -> Margin:
     if not (gnns and baselines):
         raise ValueError("a margin needs a GNN and a baseline")
     best = min(baselines, key=lambda row: row["aoi_mean"])
-    age, error = (float(np.mean([row[name] for row in gnns])) for name in ("aoi_mean", "aoi_sem"))
+    age = float(np.mean([row["aoi_mean"] for row in gnns]))
+    error = float(np.mean([row["aoi_sem"] for row in gnns]))
     ratio = age / best["aoi_mean"]
     return Margin(
         windows=best["aoi_mean"] - age,
@@ -81,7 +78,8 @@ def margin(gnns: Rows, baselines: Rows) -> Margin:
 def correlation(folder: Path) -> str:
     """Return the rank correlations of age and velocity variance over the policies (Fig. 6)."""
     flown = read(["paper-flocking"], folder)
-    rows = [["rank correlation, by velocity ratio", *map(_short, VELOCITY_RATIOS)]]
+    head = ["rank correlation, by velocity ratio", *map(_short, VELOCITY_RATIOS)]
+    rows: list[list[str]] = []
     for name, left_out in (
         ("all policies", ()),
         ("without `planner` and `greedy-oracle`", INFORMED),
@@ -93,21 +91,21 @@ def correlation(folder: Path) -> str:
         ]
         count = len({row["policy"] for row in policies})
         rows.append([f"{name} ({count})", *cells])
-    return _markdown(rows)
+    return markdown_table(head, rows)
 
 
 def rank_correlation(rows: Sequence[Row]) -> float:
     """Return Spearman's coefficient of the mean ages and the mean velocity variances."""
-    ages, variances = (
-        [row[f"{cost}_mean"] for row in rows] for cost in ("aoi", "velocity_variance")
-    )
+    ages = [row["aoi_mean"] for row in rows]
+    variances = [row["velocity_variance_mean"] for row in rows]
     found = cast(Any, spearmanr(ages, variances))  # stubs have an empty class
     return float(found.statistic)
 
 
 def trainings(_folder: Path, trained: Path = TRAINED) -> str:
     """Return how much each figure's GNNs were trained: seeds, decisions, minutes and commit."""
-    rows = [["figure", "trainings", "seeds", "team decisions of each", "minutes in all", "commit"]]
+    head = ["figure", "trainings", "seeds", "team decisions of each", "minutes in all", "commit"]
+    rows: list[list[str]] = []
     for path in sorted(trained.glob("*/trainings.csv")):
         its = _table(path)
         decisions = sorted(int(row["decisions"]) for row in its)
@@ -122,9 +120,9 @@ def trainings(_folder: Path, trained: Path = TRAINED) -> str:
                 _listed(row["commit"] for row in its),
             ]
         )
-    if len(rows) == 1:
+    if not rows:
         raise ValueError(f"{trained} has no table of trainings")
-    return _markdown(rows)
+    return markdown_table(head, rows)
 
 
 def _table(path: Path) -> list[dict[str, str]]:
@@ -137,8 +135,3 @@ def _listed(values: Iterable[Any]) -> str:
 
 def _short(value: float) -> str:
     return f"{value:g}"
-
-
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    head, *others = rows
-    return "\n".join(f"| {' | '.join(row)} |" for row in (head, ["---"] * len(head), *others))

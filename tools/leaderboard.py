@@ -18,6 +18,7 @@ from results_rows import Row, Rows, origin, read, select
 from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli.policies import facts_of
 from swarm_mj.cli.study import read_study
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.registry import POLICIES, flown_name, make_policy
 from swarm_mj.system.exit_codes import DONE
@@ -64,12 +65,11 @@ def table(folder: Path, /) -> str:
     baseline = by_policy[BASELINE]
     scores = {name: score(cells, baseline) for name, cells in by_policy.items()}
     heads = ("policy", "information", f"age against `{BASELINE}`", *(f"`{kind}`" for kind in kinds))
-    lines = [heads, ("---", "---", *("---:" for _ in heads[2:]))]
+    lines: list[tuple[str, ...]] = []
     for name in sorted(scores, key=lambda name: scores[name]):
         ages = [_age(each) for each in by_policy[name]]
         lines.append((f"`{name}`", information_of(name), f"{scores[name]:.2f}", *ages))
-    shown = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    return f"{shown}\n\n{origin(rows)}"
+    return f"{markdown_table(heads, lines, right_from=2)}\n\n{origin(rows)}"
 
 
 def kinds_of_missions() -> dict[str, Mission]:

@@ -3,6 +3,7 @@
 import json
 from pathlib import Path
 
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.system.reading import read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -18,19 +19,11 @@ def table(_results: Path, trained: Path = TRAINED) -> str:
     """
     ages = {name: _ages(trained / "curves.csv", name) for name in RUNS}
     first, *_ = ages.values()
-    lines = [
-        ["team decisions", "minutes", *RUNS.values()],
-        ["---"] * (2 + len(RUNS)),
-        *(
-            [
-                f"{decisions:,}",
-                minutes,
-                *(each.get(decisions, ("", ""))[1] for each in ages.values()),
-            ]
-            for decisions, (minutes, _) in first.items()
-        ),
-    ]
-    shown = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    lines: list[list[str]] = []
+    for decisions, (minutes, _) in first.items():
+        shown_ages = [each.get(decisions, ("", ""))[1] for each in ages.values()]
+        lines.append([f"{decisions:,}", minutes, *shown_ages])
+    shown = markdown_table(["team decisions", "minutes", *RUNS.values()], lines)
     return f"{shown}\n\n{_origin(trained / 'trainings.csv')}"
 
 

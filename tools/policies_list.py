@@ -5,6 +5,7 @@ from pathlib import Path
 from typing import Any
 
 from swarm_mj.cli.policies import carried, facts_of
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Task, paper
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import POLICIES, WITHOUT_PAYLOAD, make_policy
@@ -19,8 +20,7 @@ NUM_ROBOTS = 40
 def table(_folder: Path, /) -> str:
     """Return the list as Markdown; no results are in it."""
     rows = [_row(name, task, when) for name in POLICIES for task, when in _tasks(name)]
-    lines = [HEADS, ("---", "---", "---", "---", "---:"), *rows]
-    shown = "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    shown = markdown_table(HEADS, rows, right_from=4)
     return f"{shown}\n\n*Bytes a packet in teams of {NUM_ROBOTS}, as `swarm-mj policies` has them.*"
 
 

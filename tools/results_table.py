@@ -23,6 +23,7 @@ from results_rows import Row, Rows, origin, read, select
 
 from swarm_mj.cli import script
 from swarm_mj.cli.policies import facts_of
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import LARGER_PACKETS
 from swarm_mj.mission import paper
 from swarm_mj.policies.registry import POLICIES, make_policy
@@ -57,15 +58,11 @@ def table(spec: dict[str, Any], folder: Path) -> str:
     rows += spec.get("more", ())
     used: Rows = []
     cells = [[_cell(spec, row, column, folder, used) for column in columns] for row in rows]
-    lines = [
-        [spec.get("head", "policy"), *(column["head"] for column in columns)],
-        ["---"] * (len(columns) + 1),
-        *([_name(row, used), *its] for row, its in zip(rows, cells, strict=True)),
-    ]
+    head = [spec.get("head", "policy"), *(column["head"] for column in columns)]
+    lines = [[_name(row, used), *its] for row, its in zip(rows, cells, strict=True)]
     if not used:
         raise ValueError(f"the table of {', '.join(_sources(spec, {}, {}))} has no numbers")
-    shown = "\n".join(f"| {' | '.join(line)} |" for line in lines)
-    return f"{shown}\n\n{origin(used)}"
+    return f"{markdown_table(head, lines)}\n\n{origin(used)}"
 
 
 def _made(function: str, sources: Sequence[str], folder: Path) -> str:

@@ -52,8 +52,12 @@ def floor_windows(links: Links, seconds: float) -> float:
 
     More seconds for the search of Lemma 4 may raise it; it is proven for any number.
     """
-    hops = hop_counts(links)
-    informed = most_informed(hops, most_receptions(links, seconds))
+    return floor_of(hop_counts(links), most_receptions(links, seconds))
+
+
+def floor_of(hops: Float[np.ndarray, "N N"], receptions: int) -> float:
+    """Return the floor where a slot has so few receptions at most [windows] (Lemma 5)."""
+    informed = most_informed(hops, receptions)
     return float(np.sum(1.0 - informed / hops.size)) / SLOTS_PER_WINDOW
 
 
@@ -284,13 +288,12 @@ def rows(settings: Settings, range_ratio: float) -> Iterator[Floor]:
         links = swarm.truth.links(swarm.states.position_m[0], 0)
         hops = hop_counts(links)
         receptions = most_receptions(links, settings.seconds)
-        informed = most_informed(hops, receptions)
         yield Floor(
             task=mission.task,
             num_robots=mission.num_robots,
             range_ratio=range_ratio,
             seed=seed,
-            floor_windows=float(np.sum(1.0 - informed / hops.size)) / SLOTS_PER_WINDOW,
+            floor_windows=floor_of(hops, receptions),
             mean_hops=float(np.sum(hops)) / (hops.size - len(hops)),
             most_receptions=receptions,
             seconds=settings.seconds,

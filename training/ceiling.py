@@ -37,10 +37,9 @@ SETTLED = 120  # slots after which a plan of a team that knew nothing repeats it
 PLANNED = 180  # slots that are planned
 TRIALS = 60_000  # changes that a search tries
 SHORT_TRIALS = 6_000  # of each period, of which the best goes on
-HOT, COLD = (
-    0.06,
-    0.003,
-)  # a rise of the age that is kept in one of e cases, first and last [windows]
+# A rise of the age that is kept in one of e cases, first and last [windows].
+HOT = 0.06
+COLD = 0.003
 NUM_REPEATS = 4  # of a period until its ages repeat; the last one counts
 NEVER_SLOTS = -400.0  # the timestamp of what was never heard
 

@@ -19,13 +19,14 @@ from matplotlib.ticker import LogLocator, MultipleLocator, NullLocator
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import PERFECT
-from swarm_mj.evaluation.figures.style import FAINT, look_of, save, styled, write_caption
+from swarm_mj.evaluation.figures.style import FAINT, draw_to, look_of, styled, write_caption
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Mission, paper
 from swarm_mj.protocol.agreement import AGREED, perfect_variance
 from swarm_mj.protocol.mission_costs import VELOCITY_VARIANCE
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 COURSES = "converging-courses.csv"
@@ -54,12 +55,8 @@ class ConvergenceFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw(read_courses(self.results / COURSES), paper("flocking"))
-        for path in paths:
-            save(figure, path)
-        return 0
+        draw_to(self.out, lambda: draw(read_courses(self.results / COURSES), paper("flocking")))
+        return DONE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -149,8 +146,8 @@ def start_table(folder: Path) -> str:
     """
     mission = paper("flocking")
     courses = read_courses(folder / COURSES)
-    lines = [["windows", *(f"`{course.policy}`" for course in courses)]]
-    lines.append(["---"] * len(lines[0]))
+    head = ["windows", *(f"`{course.policy}`" for course in courses)]
+    lines: list[list[str]] = []
     for first, last in SPANS:
         cells = []
         for course in courses:
@@ -160,7 +157,7 @@ def start_table(folder: Path) -> str:
             by_them = fresh_factor(known, mission.num_robots, mission.window_s)
             cells.append(f"{known:.1f}: {measured:.2f}, {by_them:.2f}")
         lines.append([f"{first} to {last}", *cells])
-    return _markdown(lines)
+    return markdown_table(head, lines)
 
 
 def fresh_factor(known: float, num_robots: int, window_s: float) -> float:
@@ -184,15 +181,12 @@ def late_table(folder: Path) -> str:
     rows = [row for _, row in read_rows(folder / LATE, "table of late rates", MOST_BYTES)]
     sizes = list(dict.fromkeys(row["num_robots"] for row in rows))
     cells = {(row["policy"], row["num_robots"]): row for row in rows}
-    lines = [["policy", *(f"{size} robots" for size in sizes)], ["---"] * (len(sizes) + 1)]
+    head = ["policy", *(f"{size} robots" for size in sizes)]
+    lines: list[list[str]] = []
     for policy in dict.fromkeys(row["policy"] for row in rows):
         shown = [_late(cells[policy, size]) for size in sizes]
         lines.append([f"`{policy}`", *shown])
-    return _markdown(lines)
-
-
-def _markdown(lines: Sequence[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(head, lines)
 
 
 def _late(row: dict[str, str]) -> str:

@@ -19,16 +19,17 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import (
     FAINT,
     code,
+    draw_to,
     look_of,
     panels,
-    save,
     styled,
     write_caption,
 )
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import Result, config_of
 from swarm_mj.evaluation.results_files import read_results
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results"
@@ -47,12 +48,8 @@ class CrashesFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw(read_results(RESULTS / FILE))
-        for path in paths:
-            save(figure, path)
-        return 0
+        draw_to(self.out, lambda: draw(read_results(RESULTS / FILE)))
+        return DONE
 
 
 def at_density(found: Sequence[Result], density_per_km2: float) -> list[Result]:
@@ -140,9 +137,7 @@ def table(folder: Path) -> str:
         for each in at_density(found, density_per_km2):
             mean, worst = crashed(each)
             cells[_name(each)] += [f"{news_age(each):.1f}", f"{mean:.1f} ({worst:.0f})"]
-    rows = [head, ["---"] * len(head)]
-    rows += [[name, *its] for name, its in cells.items()]
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_table(head, [[name, *its] for name, its in cells.items()])
 
 
 def _name(result: Result) -> str:

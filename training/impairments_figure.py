@@ -21,9 +21,12 @@ from matplotlib.figure import Figure
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import code, look_of, save, styled, write_caption
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import Result, config_of
 from swarm_mj.evaluation.results_files import read_results
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
+from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 RESULTS = ROOT / "training" / "results"
@@ -58,8 +61,9 @@ class ImpairmentsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
+        check_outputs(Output("figure", self.out, ".png"))
         save(draw(read_results(RESULTS / FILE)), self.out)
-        return 0
+        return DONE
 
 
 def impairment(result: Result) -> str:
@@ -102,13 +106,13 @@ def table(found: Sequence[Result]) -> str:
     policies, names, ratio = ratios(found)
     ages = ages_of(found)
     factor = np.exp(np.mean(np.log(ratio), axis=0))
-    rows = [["policy", "at rest", "walking", "flocking", *names]]
-    rows.append(["---"] * len(rows[0]))
+    head = ["policy", "at rest", "walking", "flocking", *names]
+    rows: list[list[str]] = []
     for policy, factors in zip(policies, factor, strict=True):
         usual = (ages[task, policy, NONE] for task in TASKS)
         shown = (f"{age:.1f}" for age in usual)
         rows.append([f"`{policy}`", *shown, *(f"{each:.2f}" for each in factors)])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_table(head, rows)
 
 
 def docs_table(folder: Path) -> str:

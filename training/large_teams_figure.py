@@ -19,11 +19,13 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
-from swarm_mj.evaluation.figures.style import FAINT, save
+from swarm_mj.evaluation.figures.style import FAINT, draw_to
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.published import TEAM_SIZE
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.protocol.mission_costs import AOI
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 
 ROOT = Path(__file__).resolve().parent.parent
@@ -45,10 +47,8 @@ class LargeTeamsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        found = read(ROOT / "training" / "results")
-        for kind in ("svg", "png"):
-            save(draw(found), self.out.with_name(f"{self.out.name}.{kind}"))
-        return 0
+        draw_to(self.out, lambda: draw(read(ROOT / "training" / "results")))
+        return DONE
 
 
 def read(folder: Path) -> list[Result]:
@@ -62,15 +62,15 @@ def table(folder: Path) -> str:
     policies = list(dict.fromkeys(policy for policy, _ in found))
     sizes = sorted({size for _, size in found})
     shared = max(n for n in sizes if all((policy, n) in found for policy in policies))
-    rows = [["policy", f"{sizes[0]} robots", *map(str, sizes[1:]), "exponent"]]
-    rows.append(["---"] * len(rows[0]))
+    head = ["policy", f"{sizes[0]} robots", *map(str, sizes[1:]), "exponent"]
+    rows: list[list[str]] = []
     for policy in sorted(policies, key=lambda policy: found[policy, shared].aoi_mean):
         its = {n: found[policy, n] for n in sizes if (policy, n) in found}
         ages = np.array([each.aoi_mean for each in its.values()])
         power = f"{exponent(np.array([*its], float), ages):.2f}" if max(its) > LARGE else ""
         cells = (f"{its[n].aoi_mean:.1f} ± {its[n].aoi_sem:.1f}" if n in its else "" for n in sizes)
         rows.append([f"`{policy}`", *cells, power])
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    return markdown_table(head, rows)
 
 
 def own_curves(found: Sequence[Result]) -> list[Curve]:

@@ -20,15 +20,16 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
-from swarm_mj.evaluation.figures.style import save
+from swarm_mj.evaluation.figures.style import draw_to
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.missions_table import read_missions
 from swarm_mj.evaluation.published import RESULT_FIGURES
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.evaluation.samples import standard_error
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 MOST_BYTES = 10_000_000
@@ -102,16 +103,15 @@ class LimitsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw_limits(
+        draw_to(self.out, self._draw)
+        return DONE
+
+    def _draw(self) -> Figure:
+        return draw_limits(
             read_results(self.results / "paper-stationary.csv"),
             read_results(self.results / "ceiling.csv"),
             *read_floor(self.results / "floor.csv"),
         )
-        for path in paths:
-            save(figure, path)
-        return 0
 
 
 def read_floor(path: Path) -> tuple[Curve, str]:
@@ -145,9 +145,8 @@ def table(folder: Path) -> str:
     searched = _steady(folder / "ceiling.csv", SEARCHED, ratios)
     planner = _steady(folder / "paper-stationary.csv", PLANNER, ratios)
     both = list(zip(searched, planner, strict=True))
+    head = ["range ratio", *(f"{ratio:g}" for ratio in ratios)]
     rows = [
-        ["range ratio", *(f"{ratio:g}" for ratio in ratios)],
-        ["---"] * (len(ratios) + 1),
         ["proven floor", *(f"{age:.2f}" for age in floor.mean)],
         ["searched schedule, steady state", *map(_age, searched)],
         [f"`{PLANNER}`, steady state", *map(_age, planner)],
@@ -157,7 +156,7 @@ def table(folder: Path) -> str:
         ],
         ["searched schedule / planner", *(f"{its.mean / ours.mean:.2f}" for its, ours in both)],
     ]
-    return _markdown(rows)
+    return markdown_table(head, rows)
 
 
 def oracles_table(folder: Path) -> str:
@@ -169,7 +168,7 @@ def oracles_table(folder: Path) -> str:
     heads = []
     for label, _, _ in costs:
         heads += [f"{label}, `{LOOKAHEAD}`", f"`{GREEDY}`", "difference"]
-    rows = [["missions", *heads], ["---"] * (len(heads) + 1)]
+    rows: list[list[str]] = []
     for compared in COMPARED:
         row = [compared.head]
         for _, column, digits in costs:
@@ -178,7 +177,7 @@ def oracles_table(folder: Path) -> str:
             else:
                 row += [""] * 3
         rows.append(row)
-    return _markdown(rows)
+    return markdown_table(["missions", *heads], rows)
 
 
 def _both(compared: Compared, folder: Path, column: str, digits: int) -> list[str]:
@@ -232,24 +231,17 @@ def _age(age: _Age) -> str:
 def exact_table(folder: Path) -> str:
     """Return floor and optimum of small teams, as Markdown for docs/bounds.md."""
     teams = [row for _, row in read_rows(folder / "exact.csv", "table of optima", MOST_BYTES)]
-    rows = [
-        ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]", "floor / optimum"]
-    ]
-    rows.append(["---"] * len(rows[0]))
+    head = ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]"]
+    head.append("floor / optimum")
+    rows: list[list[str]] = []
     for team in teams:
-        floor, optimum, ratio = (
-            float(team[name]) for name in ("floor_windows", "optimum_windows", "ratio")
-        )
+        floor = float(team["floor_windows"])
+        optimum = float(team["optimum_windows"])
+        ratio = float(team["ratio"])
         rows.append([team["team"], f"{floor:.3f}", f"{optimum:.3f}", f"{ratio:.2f}"])
     commits = " and ".join(sorted({team["commit"] for team in teams}))
-    return (
-        f"{_markdown(rows)}\n\n*From `exact`; commit {commits}. `make results STUDIES=floor` "
-        "computes them again.*"
-    )
-
-
-def _markdown(rows: Sequence[Sequence[str]]) -> str:
-    return "\n".join(f"| {' | '.join(row)} |" for row in rows)
+    again = "`make results STUDIES=floor` computes them again."
+    return f"{markdown_table(head, rows)}\n\n*From `exact`; commit {commits}. {again}*"
 
 
 def draw_limits(

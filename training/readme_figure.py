@@ -17,12 +17,12 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import Curve, curves, results_of
 from swarm_mj.evaluation.figures.drawing import draw_curves
-from swarm_mj.evaluation.figures.style import BETTER, save
+from swarm_mj.evaluation.figures.style import BETTER, draw_to
 from swarm_mj.evaluation.published import TEAM_SIZE
 from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 POLICIES = ("planner", "sotdma", "age-gain-csma", "gnn", "tdma", "random-flooding")
@@ -54,12 +54,11 @@ class ReadmeFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw([*others(read_results(self.results)), *shipped(read_results(self.gnn))])
-        for path in paths:
-            save(figure, path)
-        return 0
+        draw_to(self.out, self._draw)
+        return DONE
+
+    def _draw(self) -> Figure:
+        return draw([*others(read_results(self.results)), *shipped(read_results(self.gnn))])
 
 
 def others(results: Sequence[Result]) -> list[Result]:
@@ -85,10 +84,11 @@ def draw(results: Sequence[Result]) -> Figure:
 
 def better(theirs: Sequence[Curve]) -> Curve:
     """Return the lowest of curves over the same x at each, as one."""
-    mean, sem = (np.stack([getattr(curve, of) for curve in theirs]) for of in ("mean", "sem"))
-    lowest = np.argmin(mean, axis=0)[None]
-    mean, sem = (np.take_along_axis(values, lowest, axis=0)[0] for values in (mean, sem))
-    return replace(theirs[0], method=BETTER, mean=mean, sem=sem)
+    mean = np.stack([curve.mean for curve in theirs])
+    sem = np.stack([curve.sem for curve in theirs])
+    lowest = np.argmin(mean, axis=0)
+    at = np.arange(len(lowest))
+    return replace(theirs[0], method=BETTER, mean=mean[lowest, at], sem=sem[lowest, at])
 
 
 if __name__ == "__main__":

@@ -51,6 +51,11 @@ TRAINING_COLUMNS = (
 class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
     """A command has said why, and its exit code is the experiment's."""
 
+    def __init__(self, code: int) -> None:
+        """Take the command's exit code."""
+        super().__init__(f"exit code {code}")
+        self.code = code
+
 
 @dataclass(frozen=True, kw_only=True)
 class Work:
@@ -264,7 +269,7 @@ def run(settings: Settings) -> int:
         for work in left:
             work.do()
     except Failed as failed:
-        return int(str(failed))
+        return failed.code
     return DONE
 
 

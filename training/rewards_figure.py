@@ -21,12 +21,13 @@ from scipy.stats import mannwhitneyu
 
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.curves import method_of
-from swarm_mj.evaluation.figures.style import look_of, panels, save, styled, write_caption
+from swarm_mj.evaluation.figures.style import draw_to, look_of, panels, styled, write_caption
+from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
-from swarm_mj.system.writing import Output, check_outputs
 
 ROOT = Path(__file__).resolve().parent.parent
 CURVES = ROOT / "training" / "reproduce" / "quick" / "rewards" / "curves.csv"
@@ -57,12 +58,8 @@ class RewardsFigure:
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
-        paths = [self.out.with_name(f"{self.out.name}.{kind}") for kind in ("svg", "png")]
-        check_outputs(*(Output("figure", path) for path in paths))
-        figure = draw(read_curves(self.curves))
-        for path in paths:
-            save(figure, path)
-        return 0
+        draw_to(self.out, lambda: draw(read_curves(self.curves)))
+        return DONE
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -76,7 +73,7 @@ class Trained:
 
     def of(self, cost: MissionCost) -> Float[np.ndarray, "S E"]:
         """Return the values of a cost."""
-        return self.aoi if cost == AOI else self.velocity_variance
+        return getattr(self, cost.column)
 
 
 def read_curves(path: Path) -> list[Trained]:
@@ -134,10 +131,10 @@ def draw(trained: Sequence[Trained]) -> Figure:
 
 def table(folder: Path) -> str:
     """Return how the trainings on either reward end and fly, as Markdown."""
-    lines = [["median (least to greatest) of 8 trainings"]]
-    lines[0] += ["trained on the age", "on the velocity variance", "p"]
-    lines.append(["---"] * len(lines[0]))
     age, variance = read_curves(CURVES)
+    head = [f"median (least to greatest) of {len(age.aoi)} trainings"]
+    head += ["trained on the age", "on the velocity variance", "p"]
+    lines: list[list[str]] = []
     for cost in COSTS:
         last = (each.of(cost)[:, -1] for each in (age, variance))
         lines.append(_row(f"{cost.title}, at the end of training", *last))
@@ -147,7 +144,7 @@ def table(folder: Path) -> str:
         for cost in COSTS:
             flown = [_flown(folder / FLIGHTS, REWARDS[name], ratio, cost) for name in REWARDS]
             lines.append(_row(f"{cost.title} of the policies kept, velocity {ratio:g}", *flown))
-    return "\n".join(f"| {' | '.join(line)} |" for line in lines)
+    return markdown_table(head, lines)
 
 
 def _swings(values: Float[np.ndarray, "S E"]) -> Float[np.ndarray, "S"]:

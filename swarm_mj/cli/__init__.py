@@ -29,7 +29,7 @@ COMMANDS: dict[str, str] = {
     "evaluate": "Compare policies on the same missions.",
     "check": "Check that flocks converge in time, by an exit code.",
     "study": "Fly a study that is a file, or compare two results.",
-    "train": "Train a communication policy by PPO.",
+    "train": "Train a communication policy: a network, or an index.",
     "curves": "Show the learning curves of training runs.",
     "figures": "Draw the paper's figures from results.",
     "replay": "Open a replay in rerun's viewer, or make a video or a picture of it.",

@@ -14,6 +14,7 @@ from swarm_mj.cli import bench_bodies, bench_decisions
 from swarm_mj.cli import bench_simulation as sim
 from swarm_mj.cli.options import output_option
 from swarm_mj.policies.registry import POLICIES, SHIPPED
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import commit, is_installed, need, version
@@ -94,7 +95,7 @@ def run(options: BenchOptions) -> int:
     plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
     if options.json:
         write_json(options.json, document(options, tables, steps_us))
-    return 0
+    return DONE
 
 
 def noise(steps_us: Sequence[float]) -> str:

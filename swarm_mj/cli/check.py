@@ -134,7 +134,8 @@ def run(options: CheckOptions) -> int:
     if found is None:
         console.print(f"{ending} before the first missions were done.")
         return code
-    if found.policy != options.policy:
+    (asked,) = study.policies
+    if found.policy != asked:
         console.print(registry.FLOWN_AS)
     _report(options, found)
     if ending:

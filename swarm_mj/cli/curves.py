@@ -24,6 +24,7 @@ from swarm_mj.learning.run_folder import (
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, files_read, setting
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs, write_csv
@@ -95,7 +96,7 @@ def run(options: CurvesOptions) -> int:
     if options.csv:
         _write_csv(options.csv, runs)
         console.print(f"Wrote {options.csv}")
-    return 0
+    return DONE
 
 
 def _read(folder: Path) -> Learned:

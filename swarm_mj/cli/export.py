@@ -8,6 +8,7 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.replay.export.formats import FORMATS, check_packages, files_of
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import files_read, setting, the_file
 from swarm_mj.system.interrupt import held_interrupts, raise_if_interrupted
 from swarm_mj.system.packages import need
@@ -65,7 +66,7 @@ def run(options: ExportOptions) -> int:
     for file, content in contents.items():
         size = f"{len(content) / 1e6:.1f} MB"
         plain_console().print(f"Wrote {shlex.quote(str(file))}: {size}")
-    return 0
+    return DONE
 
 
 def _stem(options: ExportOptions) -> Path:

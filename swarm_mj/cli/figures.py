@@ -14,6 +14,7 @@ from swarm_mj.evaluation.results import Result
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.policies.registry import files_of
 from swarm_mj.system.arguments import check_choice
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import GONE_IN, files_read, setting, the_file
 from swarm_mj.system.terminal import plain_console
 from swarm_mj.system.writing import Output, check_outputs
@@ -76,7 +77,7 @@ def run(options: FiguresOptions) -> int:
     left_out = [name for name in paths if name not in drawn]
     if left_out:
         console.print(f"Left out {', '.join(left_out)}: the results hold no point of them")
-    return 0
+    return DONE
 
 
 def _draw(

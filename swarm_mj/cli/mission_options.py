@@ -69,7 +69,7 @@ class PolicyOptions(Components):
 
     @property
     def components(self) -> Components:
-        """The channel, controller and scene, by name."""
+        """The user's own parts, by name."""
         return Components(**self.given)
 
     @property

@@ -13,6 +13,7 @@ from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.replay import view
 from swarm_mj.replay.rendering.theme import THEMES
 from swarm_mj.simulation.components import SHOWN_AS, Components
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import GONE_IN, files_read, setting, the_file
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
@@ -140,7 +141,7 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
         footage = _in_scene(read_footage(file), options.scene)
         save(draw_picture(footage, options.window), picture)
     plain_console().print(f"Wrote {shlex.quote(str(picture))}")
-    return 0
+    return DONE
 
 
 def _make_video(options: ReplayOptions, video: Path) -> int:
@@ -164,7 +165,7 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     name = shlex.quote(str(video))
     about = f"{number / style.fps:.3g} s, {number} pictures of {style.width} by {style.height}"
     plain_console().print(f"Wrote {name}: {about}, {len(content) / 1e6:.1f} MB")
-    return 0
+    return DONE
 
 
 def _style(options: ReplayOptions, suffix: str) -> view.VideoStyle:

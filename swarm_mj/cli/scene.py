@@ -12,6 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.policies import registry
 from swarm_mj.replay import view
 from swarm_mj.simulation.components import Components
+from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import files_read, same_as, setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
@@ -71,7 +72,7 @@ def _write(options: SceneOptions, out: Path) -> int:
         "The viewer opens on their start; Load key also gives them their velocities.\n"
         f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={file}"
     )
-    return 0
+    return DONE
 
 
 def _fly(options: SceneOptions) -> int:
@@ -92,7 +93,7 @@ def _fly(options: SceneOptions) -> int:
         while True:
             _fly_once(swarm, viewer)
             if not viewer.is_open:
-                return 0
+                return DONE
             swarm.restart([options.seed])
 
 

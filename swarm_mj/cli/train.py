@@ -1,4 +1,4 @@
-"""`swarm-mj train`: trains a communication policy by PPO in simulated missions."""
+"""`swarm-mj train`: trains a network by PPO, or an index by evolution, in missions."""
 
 import shlex
 from collections.abc import Callable
@@ -171,7 +171,7 @@ def _sweep(options: TrainOptions, path: Path) -> int:
 def asked_run(options: TrainOptions) -> TrainingRun:
     """Return the run that the options ask for; raise ValueError before anything is written."""
     run = _begun_run(options) if options.resume else _new_run(options)
-    if options.device is not None and run.training.policy != "gnn":
+    if options.device is not None and not run.training.way.is_network:
         raise ValueError(
             f"--device is of training a gnn, not of {run.training.policy}; leave it out"
         )
@@ -202,13 +202,12 @@ def _new_run(options: TrainOptions) -> TrainingRun:
     init = options.init
     given = options.settings
     begun_with = None
-    if init is not None and given.get("policy", "gnn") == "gnn":
+    if init is not None:
+        if train_settings.are_of_index(given):
+            raise ValueError("--init begins with a gnn, not with an index; leave it out")
         begun_with = read_policy(init)[1]
-    elif init is not None:
-        raise ValueError("--init begins with a gnn, not with an index; leave it out")
     training = train_settings.asked_settings(given, begun_with, init)
-    way = training.policy if training.policy != "gnn" else training.credit_assignment
-    limits = Limits(decisions=run_folder.BUDGETS[way], patience=run_folder.PATIENCE[way])
+    limits = Limits(decisions=training.way.budget, patience=training.way.patience)
     command = shlex.join(["swarm-mj", "train", *options.typed])
     return TrainingRun(training=training, limits=limits, command=command, init=init)
 
@@ -227,9 +226,6 @@ def asked_limits(limits: Limits, options: TrainOptions) -> Limits:
 def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) -> None:
     training = asked.training
     console = plain_console()
-    what = f"credit per {training.credit_assignment}"
-    if training.policy != "gnn":
-        what = f"{training.policy} by evolution"
     sizes = ", ".join(map(str, training.robots))
     tasks = ", ".join(values_of("task", training.all_missions))
     rows = {
@@ -238,7 +234,7 @@ def _print(out: Path, asked: TrainingRun, progress: Progress, *, is_over: bool) 
         "minutes": f"{progress.minutes:.1f}",
         "its policy": str(out / POLICY) if progress.best else "none yet",
     }
-    title = f"{out}: {what}, {tasks}, {sizes} robots"
+    title = f"{out}: {training.way.label}, {tasks}, {sizes} robots"
     console.print(named_values(title, rows))
     for line in verdicts(asked, progress):
         console.print(line)

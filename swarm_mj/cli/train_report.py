@@ -21,7 +21,6 @@ from swarm_mj.protocol.mission_costs import AOI, MissionCost
 from swarm_mj.system.terminal import WorkBar
 
 FINISHING = "finishing this {}, then all is kept; Ctrl-C again breaks off at once"
-STEPS = {"gnn": "rollout", "index-csma": "generation"}  # after which a run may stop
 CLEAR = 2.0  # standard errors of a difference that is not due to chance
 NAMES = {"first": "the policy it began with"}
 
@@ -53,7 +52,7 @@ class Watch(WorkBar):
         self.move_to(share_done(progress, self._run.limits))
         if self._is_interrupted() and not self.has_stopped:
             self.has_stopped = True
-            step = STEPS[self._run.training.policy]
+            step = self._run.training.way.step
             self._console.print(f"Interrupted: {FINISHING.format(step)}.")
         return not self.has_stopped
 

@@ -31,7 +31,7 @@ from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
     check_named,
-    has_turns,
+    gives_turns,
     is_own_set,
     load_features,
     num_features,
@@ -107,7 +107,7 @@ def asked_settings(
     `init` is the policy that the run begins with. Raise ValueError for what cannot be trained.
     """
     own = _part("", given)
-    if own.get("policy") == IndexCsma.NAME:
+    if are_of_index(given):
         return _index_settings(given)
     network = _part("network", given)
     ppo = _part("ppo", given)
@@ -146,6 +146,11 @@ def asked_settings(
     return training
 
 
+def are_of_index(given: Given) -> bool:
+    """Return whether options ask for an index."""
+    return given.get("policy") == IndexCsma.NAME
+
+
 def _index_settings(given: Given) -> Training:
     """Return the settings of a search for an index; ValueError for options that are of networks."""
     check_of_index(given)
@@ -179,7 +184,7 @@ def _usual_silence(own: Given, training: Training) -> Given:
     """Return the logit of silence that suits features with an order of turns, if these are such."""
     features = own["features"]
     is_ours = features in FEATURE_SETS  # only a user knows what the own ones say
-    if training.credit_assignment == "robot" and is_ours and has_turns(features):
+    if training.credit_assignment == "robot" and is_ours and gives_turns(features):
         return {"silence_logit": ORDERLY_SILENCE}
     return {}
 

@@ -73,7 +73,13 @@ def _trainings(tables: dict[str, Any]) -> dict[str, list[str]]:
         options: list[str] = []
         for name, value in (tables["train"] | chosen).items():
             options += _typed(name, value)
-        trainings[_name(chosen)] = options
+        folder = _name(chosen)
+        if folder in trainings:
+            raise ValueError(
+                f"two trainings would have the folder {folder}; leave one out, or give it values "
+                "that differ in more than / and :"
+            )
+        trainings[folder] = options
     return trainings
 
 

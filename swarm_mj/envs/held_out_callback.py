@@ -50,8 +50,8 @@ class HeldOutCallback(BaseCallback):
         """Take the missions, and what is kept.
 
         Args:
-            mission: What is flown; None is the mission of the model's environment. Its channel,
-                controller and scene are the environment's.
+            mission: What is flown; None is the mission of the model's environment, which
+                then gives its components, too.
             num_missions: Missions of each evaluation.
             seed: Of the first one; the others count on from it. Those that training flies are no
                 measure.

@@ -67,7 +67,7 @@ class MissionBatch:
             reward: As there.
             with_parents: As there.
             with_sensors: As there; raises ValueError for robots without sensors.
-            components: Channel, controller and scene, where they are not the mission's own.
+            components: Parts that are not the mission's own: see `Components`.
             keeps_recipients: Whether decisions are kept, so that checkpoints can fly it again.
             unknown_age: How much older than the mission a teammate never heard of counts in
                 credits [windows].

@@ -168,7 +168,8 @@ class SwarmParallelEnv(ParallelEnv[str, Observation, Action], EzPickle):
         """Return the truth, for a centralised critic; no robot observes it; see `truth`.
 
         Returns:
-            Normalised numbers without a unit, [S], where S = 1 + N (5 + N).
+            Normalised numbers without a unit, [S], where S = 1 + N (2 D + 1 + N); D is 2 axes of
+            points, 3 of bodies.
 
         Raises:
             ValueError: If no mission has begun.

@@ -16,7 +16,7 @@ from swarm_mj.policies.registry import make_policy_with
 from swarm_mj.protocol.agreement import agreed_window, decay
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import WindowCosts
-from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
+from swarm_mj.protocol.mission_costs import MISSION_COSTS, MissionCost
 from swarm_mj.protocol.packet_counts import Packets
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -209,13 +209,9 @@ class BatchCosts:
 
     def of(self, cost: MissionCost) -> Float[np.ndarray, "B"]:
         """Return one of `MISSION_COSTS`, of each mission; raise ValueError for any other cost."""
-        if cost is AOI:
-            return self.aoi
-        if cost is VELOCITY_VARIANCE:
-            return self.velocity_variance
-        if cost is TASK_COST:
-            return self.task_cost
-        raise ValueError(f"missions have no cost {cost.column}")
+        if cost not in MISSION_COSTS:
+            raise ValueError(f"missions have no cost {cost.column}")
+        return getattr(self, cost.column)
 
 
 COLUMNS: dict[str, Column[np.ndarray] | VarianceColumn[np.ndarray]] = {

@@ -53,7 +53,7 @@ class Measurements:
         return found if isinstance(found, int | float) else None
 
     def component(self, kind: str) -> str | None:
-        """Return the name of the user's own channel, controller or scene; None without one."""
+        """Return the name of a part of the user's own, such as a controller; None without one."""
         return self.study.components.names.get(kind)
 
     @cached_property

@@ -15,7 +15,12 @@ from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_co
 from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.surroundings import OPEN
-from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
+from swarm_mj.protocol.mission_costs import (
+    AOI,
+    MISSION_COSTS,
+    VELOCITY_VARIANCE,
+    MissionCost,
+)
 from swarm_mj.radio.words import radio_in_words
 from swarm_mj.system.reading import read_json
 
@@ -237,9 +242,11 @@ class Evaluated:
     @property
     def costs(self) -> dict[str, list[float]]:
         """Each mission's costs, by their columns; those that the task has."""
-        costs = {AOI.column: self.aoi, VELOCITY_VARIANCE.column: self.velocity_variance}
-        if self.task_cost is not None:
-            costs[TASK_COST.column] = self.task_cost
+        costs: dict[str, list[float]] = {}
+        for cost in MISSION_COSTS:
+            values = getattr(self, cost.column)
+            if values is not None:
+                costs[cost.column] = values
         return costs
 
     @property
@@ -280,25 +287,16 @@ def statistics_of(result: Result, cost: MissionCost) -> CostStatistics:
     Raises:
         ValueError: Results have no such cost.
     """
-    if cost is AOI:
-        return CostStatistics(
-            mean=result.aoi_mean,
-            sem=result.aoi_sem,
-            ci_low=result.aoi_ci_low,
-            ci_high=result.aoi_ci_high,
-        )
-    if cost is VELOCITY_VARIANCE:
-        return CostStatistics(
-            mean=result.velocity_variance_mean,
-            sem=result.velocity_variance_sem,
-            ci_low=result.velocity_variance_ci_low,
-            ci_high=result.velocity_variance_ci_high,
-        )
-    if cost is TASK_COST:
-        mean = math.nan if result.task_cost_mean is None else result.task_cost_mean
+    if cost not in MISSION_COSTS:
+        raise ValueError(f"results have no cost {cost.column}")
+    mean = getattr(result, f"{cost.column}_mean")
+    return CostStatistics(
+        mean=math.nan if mean is None else mean,
+        sem=getattr(result, f"{cost.column}_sem"),
         # Files hold no interval of a task's cost.
-        return CostStatistics(mean=mean, sem=result.task_cost_sem, ci_low=None, ci_high=None)
-    raise ValueError(f"results have no cost {cost.column}")
+        ci_low=getattr(result, f"{cost.column}_ci_low", None),
+        ci_high=getattr(result, f"{cost.column}_ci_high", None),
+    )
 
 
 def carries_more(result: Result) -> bool:

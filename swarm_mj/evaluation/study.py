@@ -37,7 +37,7 @@ class Study:
         is_deterministic: Whether learned policies take the most probable recipient.
         features: Users' own extractors that learned policies may load.
         networks: Users' own networks, likewise.
-        components: Channel, controller and scene, where they are not the mission's own.
+        components: Parts that are not the mission's own: see `Components`.
         baseline: The policy that others are compared with, mission by mission; None is the
             first policy.
 

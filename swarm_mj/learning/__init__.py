@@ -1,1 +1,1 @@
-"""Training (III-C): stable-baselines3's PPO over batched missions."""
+"""Training (III-C): networks by stable-baselines3's PPO, indices by evolution."""

@@ -4,7 +4,6 @@ Batches are staggered, so that every rollout holds windows from all parts of a m
 """
 
 from collections.abc import Callable, Sequence
-from itertools import cycle
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -60,12 +59,16 @@ class GraphVecEnv(SwarmVecEnv):
         """
         self.rng = rng
         self.agent = training.credit_assignment
-        self.batches = _make_batches(training)
+        kinds = [n % len(training.kinds) for n in range(training.groups)]  # of batches: in turns
+        self.batches = _make_batches(training, kinds)
         # Of each batch: its windows of late, whose credits have not been taken.
         self._windows: list[list[ReplayedWindow]] = [[] for _ in self.batches]
         # A scale for each kind of mission, which its batches share; none if credits are not scaled.
         num_scales = len(training.kinds) if training.credit_scaling == "kind" else 0
         self.credit_scales = [CreditScale() for _ in range(num_scales)]
+        self._scales: list[CreditScale | None] = [None] * len(self.batches)  # of each batch
+        if self.credit_scales:
+            self._scales = [self.credit_scales[kind] for kind in kinds]
         self.num_nodes = training.most_robots  # of every graph
         if self.agent == "team" and training.reward == "aoi":
             self.reward_unit = float(training.mission.num_windows)
@@ -137,8 +140,9 @@ class GraphVecEnv(SwarmVecEnv):
             self.memory[:] = remembered if self.agent == "robot" else remembered[self._is_robot]
         seen, reward, done, infos = super().step_wait()
         if self.considers is None:
-            for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
-                reward[envs] = scale.divided(reward[envs])
+            for scale, envs in zip(self._scales, self._envs, strict=True):
+                if scale is not None:
+                    reward[envs] = scale.divided(reward[envs])
         return seen, reward, done, infos
 
     def take_credits(self, horizon: int) -> RowCredits:
@@ -152,9 +156,9 @@ class GraphVecEnv(SwarmVecEnv):
             is_whole[:, envs] = its.is_whole[:, None]
             windows.clear()
         for window in range(num_windows):  # outside: a scale forgets by windows, not by batches
-            for scale, envs in zip(cycle(self.credit_scales), self._envs, strict=False):
+            for scale, envs in zip(self._scales, self._envs, strict=True):
                 # A part of a horizon, of which nothing is learned, would make the scale too small.
-                if is_whole[window, envs.start]:
+                if scale is not None and is_whole[window, envs.start]:
                     credit[window, envs] = scale.divided(credit[window, envs])
         return RowCredits(credit=credit, is_whole=is_whole)
 
@@ -242,20 +246,20 @@ def padded(graphs: Sequence[Graphs], num_nodes: int) -> Observation:
     return {**joined, "has_turn": np.concatenate([each.has_turn for each in graphs])[:, None]}
 
 
-def _make_batches(training: Training) -> list[MissionBatch]:
-    """Return batches that share out all missions evenly; their kinds take turns."""
+def _make_batches(training: Training, kinds: Sequence[int]) -> list[MissionBatch]:
+    """Return batches of missions of these kinds, by number, which share out all evenly."""
     num_missions = training.missions
-    num_batches = training.groups
-    kinds = training.kinds
-    if num_missions % num_batches or not len(kinds) <= num_batches <= num_missions:
+    num_batches = len(kinds)
+    flown = training.kinds
+    if num_missions % num_batches or not len(flown) <= num_batches <= num_missions:
         raise ValueError(
             f"missions must be a multiple of their {num_batches} batches, of which each of the "
-            f"{len(kinds)} kinds of missions needs one, not {num_missions}"
+            f"{len(flown)} kinds of missions needs one, not {num_missions}"
         )
     batches: list[MissionBatch] = []
-    for n in range(num_batches):
+    for kind in kinds:
         batch = MissionBatch(
-            kinds[n % len(kinds)],
+            flown[kind],
             num_missions // num_batches,
             features=training.features,
             reward="credit" if training.credit_assignment == "robot" else training.reward,

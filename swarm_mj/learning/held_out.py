@@ -82,13 +82,13 @@ class Flights:
             self.on_window(self.num_windows / in_all)
 
 
-def held_out_policy(training: Training, network: Acting, mission: Mission) -> Policy:
+def held_out_policy(training: Training, acting: Acting, mission: Mission) -> Policy:
     """Return the policy under training, as it flies."""
-    if isinstance(network, Weights):
-        return IndexCsma(mission, network)
+    if isinstance(acting, Weights):
+        return IndexCsma(mission, acting)
     extractor = make_extractor(training.features, mission)
     return GnnPolicy(
-        network,
+        acting,
         extractor,
         silence_logit=training.silence_logit,
         most_speech=training.most_speech,
@@ -97,7 +97,7 @@ def held_out_policy(training: Training, network: Acting, mission: Mission) -> Po
 
 def evaluate(
     training: Training,
-    network: Acting,
+    acting: Acting,
     references: References | None = None,
     on_window: OnWindow = lambda _share: None,
 ) -> tuple[HeldOutCosts, Columns]:
@@ -105,7 +105,7 @@ def evaluate(
 
     Args:
         training: The settings of the run.
-        network: It flies, or an index does; its weights are not changed.
+        acting: The network or the index that flies; its weights are not changed.
         references: What `fly_references` has returned: policies to compare with, pair by pair.
         on_window: It is called after every window with the share flown.
 
@@ -114,7 +114,7 @@ def evaluate(
         the news is on the same missions, with its standard error.
     """
     flights = Flights(training=training, on_window=on_window)
-    flies = partial(held_out_policy, training, network)
+    flies = partial(held_out_policy, training, acting)
     flown = flights.fly(flies, HELD_OUT_SEED, training.held_out)
     ages = _samples(flown, AOI)
     behind: Columns = {}
@@ -144,15 +144,15 @@ def fly_references(training: Training, on_window: OnWindow) -> References:
 def reference_columns(references: References) -> Columns:
     """Return the mean costs of references by the curve's columns."""
     columns: Columns = {}
-    for name, by_size in references.items():
-        columns[name] = _mean([np.array(each) for each in by_size])
+    for name, by_kind in references.items():
+        columns[name] = _mean([np.array(each) for each in by_kind])
     return columns
 
 
 def choose(
     training: Training,
     curve: Sequence[CurveRow],
-    networks: Mapping[int, Acting],  # the candidates', by the decisions behind them
+    candidates: Mapping[int, Acting],  # by the decisions behind them
     on_window: OnWindow,
 ) -> tuple[Choice, HeldOutCosts]:
     """Choose among the finalists of a whole run on fresh missions; return its cost on others."""
@@ -162,7 +162,7 @@ def choose(
     size = selection.num_missions(training, run_decisions, flights.total)
 
     def flies(row: CurveRow) -> MakePolicy:
-        return partial(held_out_policy, training, networks[row.decisions])
+        return partial(held_out_policy, training, candidates[row.decisions])
 
     def objective(row: CurveRow) -> float:
         return _means(training, flights.fly(flies(row), CHOICE_SEED, size)).objective
@@ -212,12 +212,12 @@ def notes_of(training: Training, choice: Choice | None) -> dict[str, Any]:
     }
 
 
-def record_first(training: Training, network: Acting, on_window: OnWindow) -> Recorder:
+def record_first(training: Training, acting: Acting, on_window: OnWindow) -> Recorder:
     """Fly the first held-out mission, as evaluations do; return its record."""
     mission = training.kinds[0]
     swarm = Swarm(mission, [HELD_OUT_SEED], **training.components.given)
     recorder = Recorder(swarm)
-    for window in rollout(swarm, held_out_policy(training, network, mission)):
+    for window in rollout(swarm, held_out_policy(training, acting, mission)):
         recorder.add(window)
         on_window(recorder.num_windows / mission.num_windows)
     return recorder
@@ -228,11 +228,11 @@ def recorded_of(training: Training, decisions: int) -> dict[str, int]:
     return {"decisions": decisions, "seed": HELD_OUT_SEED, "training seed": training.seed}
 
 
-def record_replay(training: Training, network: Acting, decisions: int, folder: Path) -> None:
-    """Record the first held-out mission, as the network flies it after this many team decisions."""
+def record_replay(training: Training, acting: Acting, decisions: int, folder: Path) -> None:
+    """Record the first held-out mission, as it is flown after this many team decisions."""
     from swarm_mj.replay.write import write_replay  # rerun is slow to import
 
-    recorder = record_first(training, network, lambda _share: None)
+    recorder = record_first(training, acting, lambda _share: None)
     about = recorded_of(training, decisions)
     write_replay(recorder.log(about), about, folder / f"decisions-{decisions:09d}.rrd")
 

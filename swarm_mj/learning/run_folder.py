@@ -20,6 +20,7 @@ from swarm_mj.learning.selection import (
     reference_ages,
 )
 from swarm_mj.learning.settings import MAX_DECISIONS, Device, Training
+from swarm_mj.learning.ways import ROBOT, TEAM
 from swarm_mj.mission import Mission
 from swarm_mj.policies.gnn.feature_sets import remembers_packets
 from swarm_mj.policies.policy_config import NO_BOUND
@@ -45,9 +46,6 @@ AS_1_0_TRAINED: Document = {"most_speech": NO_BOUND, "unknown_age": 0.0, "train_
 AS_1_0_OPTIMISED: Document = {"horizon": 1, "considered": 1.0, "kept": 0.0}
 MAX_BYTES = 1_000_000  # of the settings
 MAX_CURVE_BYTES = 10_000_000
-# Team decisions, by the credit or the policy; the paper's for the paper's way.
-BUDGETS = {"robot": 200_000, "team": 2_000_000, "index-csma": 2_000_000}
-PATIENCE = {"robot": 8, "team": 40, "index-csma": 8}  # evaluations
 KEPT_ROWS = 0.5  # share that PPO passes over where it considers speech; rather too high
 WINDOW_BYTES = 2.0  # of the checkpoint, for each robot and window of a mission
 CHECKPOINT_BYTES = 0.01 * needs.GB  # and in any case
@@ -63,7 +61,7 @@ class Limits:
         label="budget",
         low=1,
         high=MAX_DECISIONS,
-        shown=f"{BUDGETS['robot']}, team and index-csma: {BUDGETS['team']}; none with --minutes",
+        shown=f"{ROBOT.budget}, team and index-csma: {TEAM.budget}; none with --minutes",
     )
     minutes: float | None = common_setting(
         None,
@@ -83,7 +81,7 @@ class Limits:
         "stop after this many evaluations in a row without improvement; 0: never",
         low=0,
         high=1_000_000,
-        shown=f"{PATIENCE['robot']}, team: {PATIENCE['team']}",
+        shown=f"{ROBOT.patience}, team: {TEAM.patience}",
     )
     checkpoint_every_s: float = setting(10.0, low=0.0, high=1e6)  # at least, between two
 
@@ -225,7 +223,7 @@ def training_needs(training: Training, limits: Limits, *, is_shown: bool = False
 
     One that is shown while it goes on records a mission at a time, as replays do.
     """
-    if training.policy == "index-csma":
+    if not training.way.is_network:
         return _index_needs(training, limits, is_shown=is_shown)
     first = training.kinds[0]  # of the replays
     size = training.most_robots

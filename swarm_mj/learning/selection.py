@@ -86,8 +86,11 @@ def curve_row_of(row: Mapping[str, float]) -> CurveRow:
     references: Columns = {}
     training: Columns = {}
     for name, value in left.items():
-        # A slash makes a group in TensorBoard, which is where these two kinds come from.
-        (training if "/" in name else references)[name] = value
+        # A slash makes a group in TensorBoard, which is where what is of training goes.
+        if "/" in name:
+            training[name] = value
+        else:
+            references[name] = value
     return CurveRow(
         decisions=decisions,
         minutes=minutes,
@@ -162,7 +165,7 @@ class Progress:
     next_replay: int = 0  # team decisions
     curve: list[CurveRow] = field(default_factory=list)
     since_evaluation: Accumulator = field(default_factory=Accumulator)
-    optimiser: Columns = field(default_factory=dict)  # what PPO last logged of itself
+    optimiser: Columns = field(default_factory=dict)  # what the optimiser last said of itself
     choice: Choice | None = None  # of the policy that is kept; None: it is of the best evaluation
     evaluation_minutes: float = 0.0  # that the last one took
     references: References = field(default_factory=dict)  # flown once; none in runs of 1.0.0
@@ -247,7 +250,7 @@ def reached(curve: Sequence[CurveRow], name: str) -> CurveRow | None:
 
 def behind_column(name: str) -> str:
     """Return the curve's column for how much older than one of `COMPARED` a policy's news is."""
-    return column(AOI, f"behind {name}".replace(" ", "_"))
+    return column(AOI, f"behind_{name}")
 
 
 def references_flown(training: Training) -> list[str]:

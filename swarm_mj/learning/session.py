@@ -68,6 +68,7 @@ class Session(ABC):
         self.progress = Progress()
         self._kept: dict[int, Acting] = {}  # what may be chosen, by the decisions behind it
         self._counted_s = time.monotonic()  # until when time is in the progress
+        self._is_in_step = False
         self._saved_s = -math.inf
 
     def learn(self) -> None:
@@ -83,7 +84,11 @@ class Session(ABC):
             self._between_steps(is_last=is_last or progress.has_stalled(patience))
             if is_last or not self._goes_on or progress.has_stalled(patience):
                 return
+            self._count_time()
+            self._is_in_step = True
             self._take_step()
+            self._count_time()
+            self._is_in_step = False
 
     @abstractmethod
     def _take_step(self) -> None:
@@ -138,9 +143,11 @@ class Session(ABC):
     def _count_time(self) -> None:
         """Move the time since the last call into the progress."""
         now_s = time.monotonic()
-        self.progress.minutes += (now_s - self._counted_s) / 60.0
-        self.progress.since_evaluation.seconds += now_s - self._counted_s
+        passed_s = now_s - self._counted_s
         self._counted_s = now_s
+        self.progress.minutes += passed_s / 60.0
+        if self._is_in_step:  # evaluations, files and pictures are no part of what decisions take
+            self.progress.since_evaluation.seconds += passed_s
 
     def _between_steps(self, *, is_last: bool) -> None:
         """Evaluate, record a replay and keep a checkpoint, each if it is due."""
@@ -217,9 +224,6 @@ class Session(ABC):
             return
         progress = self.progress
         acting = self._acting()
-        self._count_time()
-        # Showing is no part of the time that decisions take.
-        seconds = progress.since_evaluation.seconds
         try:
             flown = held_out.record_first(self._training, acting, on_window)
         except Stopped:
@@ -227,8 +231,6 @@ class Session(ABC):
         self._live.do(
             lambda live: live.show(self._training, flown, progress.decisions, progress.curve)
         )
-        self._count_time()
-        progress.since_evaluation.seconds = seconds
 
     def choose(self) -> None:
         """Choose the policy that is kept, once nothing is left to train and if none is chosen."""

@@ -5,6 +5,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal, get_args
 
+from swarm_mj.learning.ways import CreditAssignment, TrainedPolicy, Way, way_of
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.policies.gnn.feature_sets import FEATURE_SETS, is_own_set, num_features
@@ -20,8 +21,6 @@ from swarm_mj.simulation.components import Components
 from swarm_mj.system.fields import as_typed, check, check_value, common_setting, setting
 from swarm_mj.system.user_code import files_named
 
-TrainedPolicy = Literal["gnn", "index-csma"]  # a network, by PPO; an index, by evolution
-CreditAssignment = Literal["robot", "team"]  # per robot, per team
 CreditScaling = Literal["none", "kind"]  # as they are, by what is usual in their kind of mission
 Device = Literal["auto", "cpu", "cuda"]  # auto: cuda if torch finds one
 LEARNED_COSTS = (AOI, VELOCITY_VARIANCE)  # that a run can lower
@@ -217,7 +216,7 @@ class Training:
         seed: The same seed is the same policy.
         evaluate_every: Team decisions between two evaluations.
         held_out: Missions of an evaluation, of each kind.
-        components: Channel, controller and scene, where they are not the mission's own.
+        components: Parts that are not the mission's own: see `Components`.
         threads: Torch's threads.
 
     Raises:
@@ -344,9 +343,9 @@ class Training:
     def __post_init__(self) -> None:
         check(self)
         check_fit(self.network, self.features)
-        if not self.robots and self.policy == "gnn":
+        if not self.robots and self.way.is_network:
             raise ValueError("robots must have at least 1 size")
-        if self.policy == "index-csma" and self.cost is not AOI:
+        if not self.way.is_network and self.cost is not AOI:
             raise ValueError(f"reward {self.reward} is of a gnn; choose policy gnn, or reward aoi")
         if len(self.train_windows) > 2 or list(self.train_windows) != sorted(self.train_windows):
             given = " ".join(map(str, self.train_windows))
@@ -380,6 +379,11 @@ class Training:
         if self.credit_assignment == "team" and other.preset != self.mission.preset:
             both = f"{self.mission.preset} and {other.preset}"
             raise ValueError(f"credit team takes one preset, not {both}; choose credit robot")
+
+    @property
+    def way(self) -> Way:
+        """How it is trained."""
+        return way_of(self.policy, self.credit_assignment)
 
     @property
     def all_missions(self) -> tuple[Mission, ...]:

@@ -1,4 +1,4 @@
-"""The training run (III-C): PPO's loop from an empty folder or a checkpoint to a stored policy."""
+"""The training run (III-C), from an empty folder or a checkpoint to a policy; PPO's session."""
 
 from collections.abc import Callable
 from dataclasses import asdict
@@ -20,7 +20,7 @@ from swarm_mj.learning.ppo import make_model, mean_entropy, policy_of
 from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Listener, Progress
 from swarm_mj.learning.session import Session, record_evaluation
-from swarm_mj.learning.settings import TrainedPolicy
+from swarm_mj.learning.ways import TrainedPolicy
 from swarm_mj.policies.gnn.network import Network
 from swarm_mj.policies.policy_config import GnnConfig
 from swarm_mj.policies.stored import read_policy, save_gnn

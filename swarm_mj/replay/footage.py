@@ -199,6 +199,12 @@ class Footage:
             )
         return found
 
+    def heights_m(self, row: int) -> Float[np.ndarray, "N"]:
+        """Return how high the robots are above the floor in one window [m]; points are on it."""
+        if self.height_m is None:
+            return np.zeros(self.is_on.shape[1])
+        return self.height_m[row]
+
     def above(self, base_m: float) -> float | Float[np.ndarray, "T N"]:
         """Return how high is what is drawn so far above each robot [m]."""
         return base_m if self.height_m is None else self.height_m + base_m
@@ -212,12 +218,18 @@ class Footage:
         links = self.mismatch.at(int(self.window[row]))
         return links[self.is_own(links)]
 
-    def mismatch_lines(self, row: int) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
-        """Return the lines of one window's links [m], and their colours."""
+    def mismatch_lines(
+        self, row: int, base_m: float = 0.0
+    ) -> tuple[Lines, UInt8[np.ndarray, "S 3"]]:
+        """Return the lines of one window's links in space, and their colours.
+
+        They are `base_m` above the robots' places [m].
+        """
+        place_m = compared.lifted(self.position_m[row], self.heights_m(row) + base_m)
         lines_m = []
         colours = []
         for kind, links in compared.by_kind(self.links(row)).items():
-            ends_m = compared.ends(links, self.position_m, row)
+            ends_m = compared.ends(links, place_m[None], 0)
             pieces = compared.PIECES[kind]
             lines_m.append(compared.divided(ends_m, pieces))
             colours.append(np.repeat(compared.shades(kind, links), len(pieces), axis=0))

@@ -53,7 +53,7 @@ LINK = np.dtype(
     ]
 )
 LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
-Lines: TypeAlias = Float[np.ndarray, "_ 2 2"]  # from start to end [m]
+Lines: TypeAlias = Float[np.ndarray, "_ 2 D"]  # from start to end, on the map or in space [m]
 
 
 class PacketPaths(NamedTuple):
@@ -233,10 +233,10 @@ def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
     """Divide lines from start to end into pieces, as many of each [m]."""
     start_m, end_m = np.moveaxis(lines_m, 1, 0)
     way_m = end_m - start_m
-    # [line, piece, its start or end, x or y]
+    # [line, piece, its start or end, along which axis]
     along = pieces[None, :, :, None]
     ends_m = start_m[:, None, None, :] + along * way_m[:, None, None, :]
-    return ends_m.reshape(-1, 2, 2)
+    return ends_m.reshape(-1, *lines_m.shape[1:])
 
 
 def shades(kind: LinkKind, links: LinkRows) -> UInt8[np.ndarray, "L 3"]:

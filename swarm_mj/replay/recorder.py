@@ -1,13 +1,13 @@
 """The record of a flight for its replay: one mission's windows as plain arrays."""
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import replace
 from numbers import Integral
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float32, Int
 
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.protocol.buffers import NEVER
@@ -93,11 +93,10 @@ def _room(num_windows: int, num_robots: int) -> _Rows:
     )
 
 
-def _enlarged(array: np.ndarray, num_rows: int) -> np.ndarray:
-    """Return an array with more rows, the first as they were."""
-    larger = np.empty((num_rows, *array.shape[1:]), dtype=array.dtype)
-    larger[: len(array)] = array
-    return larger
+def _copy_rows(kept: Iterable[np.ndarray], room: Iterable[np.ndarray]) -> None:
+    """Copy arrays into larger ones, as their first rows."""
+    for array, larger in zip(kept, room, strict=True):
+        larger[: len(array)] = array
 
 
 class _Compared(NamedTuple):
@@ -119,8 +118,7 @@ class Recorder:
         num_robots = swarm.mission.num_robots
         check_observer(ego, num_robots)
         self._in_matrix = in_matrix(num_robots)
-        matrix = len(self._in_matrix), len(self._in_matrix)
-        matrices_bytes = AGE_BYTES * math.prod(matrix) * swarm.mission.num_windows
+        matrices_bytes = AGE_BYTES * len(self._in_matrix) ** 2 * swarm.mission.num_windows
         self._stride = max(1, int(np.ceil(matrices_bytes / MAX_AGE_MATRIX_BYTES)))
         self._radio_stride = links.stride_of(swarm, self._stride)
         self._swarm = swarm
@@ -131,8 +129,7 @@ class Recorder:
         self._body_rows = None
         if swarm.mission.has_bodies:
             self._body_rows = _room_for_bodies(first_room, num_robots)
-        # Half the memory; the picture has 256 shades.
-        self._age = np.empty((-(-first_room // self._stride), *matrix), dtype=np.float32)
+        self._age = self._room_for_ages(first_room)
         self._task_costs: list[TaskCost] = []
         self._snapshots: list[links.RadioSnapshot] = []  # none in free space
         self._all_on = np.ones(num_robots, dtype=np.bool_)
@@ -161,14 +158,25 @@ class Recorder:
 
     def _make_room(self) -> None:
         """Make room for twice as many windows."""
+        num_robots = len(self._all_on)
         num_rows = 2 * len(self._rows.age_mean)
-        larger = {}
-        for name, array in self._rows._asdict().items():
-            larger[name] = _enlarged(array, num_rows)
-        self._age = _enlarged(self._age, -(-num_rows // self._stride))
-        self._rows = _Rows(**larger)
+        age = self._room_for_ages(num_rows)
+        _copy_rows([self._age], [age])
+        self._age = age
         if self._body_rows is not None:
-            self._body_rows = _BodyRows(*(_enlarged(each, num_rows) for each in self._body_rows))
+            body_rows = _room_for_bodies(num_rows, num_robots)
+            _copy_rows(self._body_rows, body_rows)
+            self._body_rows = body_rows
+        # Last: by their number `add` tells whether there is room.
+        rows = _room(num_rows, num_robots)
+        _copy_rows(self._rows, rows)
+        self._rows = rows
+
+    def _room_for_ages(self, num_windows: int) -> Float32[np.ndarray, "K M M"]:
+        """Return room for the age matrices of windows."""
+        size = len(self._in_matrix)
+        # Half the memory; the picture has 256 shades.
+        return np.empty((-(-num_windows // self._stride), size, size), dtype=np.float32)
 
     def _copy_states(self, row: int) -> None:
         """Copy where the robots are and what they did, and what the ego robot knows."""
@@ -255,9 +263,15 @@ class Recorder:
     def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
         """Return the windows from a row on, up to another."""
         flown = _Rows(*(array[first:after] for array in self._rows))
-        height_m = attitude = thrust = wind_mps = None
+        facts = self._facts(config)
+        place_m = flown.position_m
+        bodies: dict[str, np.ndarray] = {}  # of points, `Log` has none of these fields
         if self._body_rows is not None:
-            height_m, attitude, thrust, wind_mps = (array[first:after] for array in self._body_rows)
+            body_rows = _BodyRows(*(array[first:after] for array in self._body_rows))
+            place_m = links.lifted(flown.position_m, body_rows.height_m)
+            bodies = body_rows._asdict()
+            if not facts.mission.has_wind:
+                del bodies["wind_mps"]
         lead = slice(max(0, first - LEAD_WINDOWS), first)
         compared = self._compared(flown.is_on, first)
         window = np.arange(first + 1, after + 1)
@@ -265,11 +279,10 @@ class Recorder:
         # An interrupt within `add` leaves one snapshot or cost too many.
         costs = self._task_costs[first:after]
         value = np.array([cost.value[self._index] for cost in costs])
-        facts = self._facts(config)
         packets = links.fates(
             flown.recipient,
             flown.heard,
-            flown.position_m if height_m is None else links.lifted(flown.position_m, height_m),
+            place_m,
             is_broadcast=facts.is_broadcast,
         )
         return Log(
@@ -286,11 +299,8 @@ class Recorder:
             age_window=np.arange(matrices.start, matrices.stop) * self._stride + 1,
             age=self._age[matrices],
             task_cost=replace(costs[0], value=value) if costs else None,
-            height_m=height_m,
-            attitude=attitude,
-            thrust=thrust,
-            wind_mps=wind_mps if facts.mission.has_wind else None,
             **flown._asdict(),
+            **bodies,
             **compared._asdict(),
         )
 

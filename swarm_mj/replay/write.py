@@ -333,16 +333,16 @@ def _draw_mismatch(out: RerunLog, height_m: float) -> None:
     for kind, those in by_kind(links[is_own]).items():
         _draw_links(out, kind, those, layers.LINKS[kind], layers.SCENE_LINKS[kind], height_m)
     for kind, those in by_kind(links[~is_own]).items():
-        on_map = of_others(layers.LINKS[kind])
+        flat = of_others(layers.LINKS[kind])
         in_scene = of_others(layers.SCENE_LINKS[kind])
-        _draw_links(out, kind, those, on_map, in_scene, height_m)
+        _draw_links(out, kind, those, flat, in_scene, height_m)
 
 
 def _draw_links(
     out: RerunLog,
     kind: LinkKind,
     links: LinkRows,
-    on_map: Lines,
+    flat: Lines,
     in_scene: Lines3D,
     height_m: float,
 ) -> None:
@@ -357,7 +357,7 @@ def _draw_links(
     out.mismatch_lines(in_scene, kind, links, lifted(whole_m, above_m))
     pieces = PIECES[kind]
     each = np.repeat(links, len(pieces))
-    out.mismatch_lines(on_map, kind, each, divided(whole_m, pieces))
+    out.mismatch_lines(flat, kind, each, divided(whole_m, pieces))
 
 
 def _draw_cut_off(out: RerunLog, radius_m: float) -> None:

@@ -11,6 +11,7 @@ from swarm_mj.cli import check, main, parse
 from swarm_mj.cli.check import MOST_JOBS
 from swarm_mj.evaluation.convergence import converging
 from swarm_mj.mission import paper
+from swarm_mj.policies import registry
 from swarm_mj.policies.gnn.own_networks import load_network, make_network
 from swarm_mj.policies.policy_config import GnnShape
 from swarm_mj.policies.stored import save_gnn
@@ -63,6 +64,17 @@ def test_a_controller_of_one_s_own_is_checked_by_its_cost(succeed, refusal, tmp_
     assert "converged:  mean speed below 1 m/s, for good" in done.stdout
     assert "is in m/s, not m" in refusal(*line, "--below", "1", "--unit", "m")
     assert "say below which number of it" in refusal(*line)
+
+
+@pytest.mark.parametrize(("task", "is_said"), [("stationary", False), ("random-walk", True)])
+def test_only_a_policy_that_flies_as_another_is_said_to(capsys, here, monkeypatch, task, is_said):
+    """Without a payload, robots at rest agree on a plan all the same."""
+    monkeypatch.syspath_prepend(str(here))
+    (here / "resting.py").write_text(CONTROLLER)
+    line = ["check", task, "--robots", "4", "--windows", "20", "--payload", "none"]
+    goal = ["--within", "1", "--below", "1", "--episodes", "1", "--jobs", "1"]
+    main([*line, *goal, "--controller", "resting:Rest"])
+    assert (registry.FLOWN_AS in capsys.readouterr().err.replace("\n", " ")) == is_said
 
 
 @pytest.mark.parametrize(

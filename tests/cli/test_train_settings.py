@@ -10,8 +10,9 @@ from tiny_policies import tiny_config, tiny_network
 from swarm_mj.cli import main, parse
 from swarm_mj.cli.train import asked_limits
 from swarm_mj.cli.train_settings import asked_settings, refuse_others
-from swarm_mj.learning.run_folder import BUDGETS, Limits
+from swarm_mj.learning.run_folder import Limits
 from swarm_mj.learning.settings import ORDERLY_SILENCE, usual_settings
+from swarm_mj.learning.ways import ROBOT, TEAM
 from swarm_mj.mission import paper
 
 
@@ -46,7 +47,7 @@ def test_the_defaults_that_the_help_shows_are_the_usual_settings(capsys):
         "several are trained on together, 2 to 200 (default: 40)",
         "reflect, none (default: the preset's own)",
         f"task, range and so on, 1 to 10000 (default: {robot.held_out})",
-        f"(default: {BUDGETS['robot']}, team and index-csma: {BUDGETS['team']}; none with",
+        f"(default: {ROBOT.budget}, team and index-csma: {TEAM.budget}; none with",
     ):
         assert text in shown
 
@@ -214,7 +215,7 @@ def test_a_run_that_goes_on_has_its_own_settings():
         refuse_others(given("--credit", "team"), training, "the run")
 
 
-NEW, STORED = Limits(decisions=BUDGETS["robot"]), Limits(decisions=5, minutes=1.0, replay_every=3)
+NEW, STORED = Limits(decisions=ROBOT.budget), Limits(decisions=5, minutes=1.0, replay_every=3)
 
 
 @pytest.mark.parametrize(

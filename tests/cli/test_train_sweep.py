@@ -101,6 +101,8 @@ def test_processes_train_the_same(sweep):
         ("[sweeps]\nseed = [1]\n", "sweeps"),
         ("[sweep]\nseed = []\n", "it must have 1 to 1000 trainings, not 0"),
         (f"[sweep]\nseed = {list(range(1001))}\n", "it must have 1 to 1000 trainings, not 1001"),
+        ("[sweep]\nseed = [1, 2, 1]\n", "two trainings would have the folder seed-1;"),
+        ("[sweep]\nfeatures = ['a:b', 'a/b']\n", "would have the folder features-a-b;"),
         ("[train]\nout = 'x'\n", "--out belongs on the command line, not into the file"),
         ("[train]\nrobots = 5\nlive = 'web'\n", "sweep.toml: --live shows one training"),
         ("[train]\nseed = 1979-05-27\nrobots = 5\n", "1979-05-27"),

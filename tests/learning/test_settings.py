@@ -88,7 +88,8 @@ def test_settings_that_say_nothing_of_a_horizon_had_none():
 
 def test_silence_is_dropped_only_where_it_earns_nothing():
     robot = usual_settings("robot", paper("stationary"), (40,))
-    assert robot.considers_speech == (robot.ppo.discount == 0.0)
+    assert robot.ppo.discount == 0.0
+    assert robot.considers_speech
     discounted = replace(robot.ppo, discount=0.5, horizon=1)
     assert not replace(robot, ppo=discounted).considers_speech
     assert not small_training("team").considers_speech

@@ -66,7 +66,7 @@ def test_at_once_only_the_observer_s_links_are_shown(two_way):
         lines, colours = seen.mismatch_lines(7)
         assert len(lines) == len(colours) == num_lines
         if observer == 2:
-            np.testing.assert_allclose(lines[0], made.position_m[7, [0, 2]])
+            np.testing.assert_allclose(lines[0, :, :2], made.position_m[7, [0, 2]])
             assert colours.tolist() == [list(palette.UNBELIEVED)]
 
 

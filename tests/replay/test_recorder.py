@@ -94,17 +94,24 @@ def test_free_space_has_no_snapshots():
     assert not np.any(log.is_cut_off)
 
 
-@pytest.mark.parametrize("stride_bytes", [64e6, 5 * 8 * 8 * 4.0])
-def test_a_record_that_outgrows_its_room_is_the_same(monkeypatch, stride_bytes):
+@pytest.mark.parametrize(
+    ("stride_bytes", "own"),
+    [(64e6, {}), (5 * 8 * 8 * 4.0, {}), (64e6, {"robot": "quadrotor", "wind_mps": 2.0})],
+)
+def test_a_record_that_outgrows_its_room_is_the_same(monkeypatch, stride_bytes, own):
     """Room for one window, then two, four and so on, with every age matrix and every third."""
     monkeypatch.setattr(recorder, "MAX_AGE_MATRIX_BYTES", stride_bytes)
-    swarm = Swarm(paper("random-walk", num_robots=8, num_windows=12), [3])
+    swarm = Swarm(paper("random-walk", num_robots=8, num_windows=12, **own), [3])
     ample, tight = Recorder(swarm), Recorder(swarm, first_room=1)
     for window in rollout(swarm, make_policy("mst", swarm.mission, 0.4)):
         ample.add(window)
         tight.add(window)
     expected, found = ample.log(), tight.log()
-    for name in (*recorder._Rows._fields, "age", "age_window"):
+    assert (found.wind_mps is not None) == ("robot" in own)
+    fields = [*recorder._Rows._fields, "age", "age_window"]
+    if own:
+        fields += recorder._BodyRows._fields
+    for name in fields:
         np.testing.assert_array_equal(getattr(found, name), getattr(expected, name), name)
 
 

@@ -6,6 +6,7 @@ oracles, which no team could fly, are thin.
 """
 
 import io
+from collections.abc import Callable
 from contextlib import AbstractContextManager
 from dataclasses import replace
 from pathlib import Path
@@ -20,7 +21,7 @@ from matplotlib.text import Text
 from swarm_mj.policies.about import Look
 from swarm_mj.policies.registry import LISTED, about_of
 from swarm_mj.system.interrupt import raise_if_interrupted
-from swarm_mj.system.writing import write_bytes
+from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 WIDTH_IN = 7.5  # shown at 900 pixels, a point of type is 1.7 pixels
 TITLE_PT = 10.0
@@ -142,6 +143,24 @@ def code(version: str, *commits: str | None) -> str:
         return f"swarm_mj {version}"
     noun = "commit" if len(known) == 1 else "commits"
     return f"swarm_mj {version}, {noun} {', '.join(known)}"
+
+
+def draw_to(out: Path, draw: Callable[[], Figure]) -> None:
+    """Draw a figure and write it as SVG and as PNG, once it is known that both can be written.
+
+    Args:
+        out: The files, without their endings; they are replaced if they exist.
+        draw: Returns the figure, with its caption from `write_caption`.
+
+    Raises:
+        ValueError: A file's place is no place for a file.
+        OSError: A file cannot be written.
+    """
+    paths = [out.with_name(f"{out.name}.{kind}") for kind in ("svg", "png")]
+    check_outputs(*(Output("figure", path) for path in paths))
+    figure = draw()
+    for path in paths:
+        save(figure, path)
 
 
 def save(figure: Figure, path: Path) -> None:

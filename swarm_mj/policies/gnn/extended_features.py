@@ -114,6 +114,7 @@ class ExtendedFeatures(FeatureExtractor):
         "by the rule of spatial-tdma, in the order of identities and by the clock"
     )
     remembers_packets: ClassVar[bool] = True
+    gives_turns: ClassVar[bool] = True
     node: ClassVar[np.dtype] = NODE
 
     def start(self, num_missions: int, num_robots: int) -> None:
@@ -158,6 +159,7 @@ class LocalFeatures(ExtendedFeatures):
 
     names: ClassVar[tuple[str, ...]] = tuple(feature.name for feature in LOCAL_FEATURES.values())
     uses: ClassVar[str] = "its buffer, and the packets it sent and received"
+    gives_turns: ClassVar[bool] = False
     node: ClassVar[np.dtype] = LOCAL_NODE
 
     def start(self, num_missions: int, num_robots: int) -> None:

@@ -68,10 +68,9 @@ def remembers_packets(features: str) -> bool:
     return _feature_set(features).remembers_packets
 
 
-def has_turns(features: str) -> bool:
-    """Return whether a set's graphs say whose turn it is; raises as `make_extractor`."""
-    found = _feature_set(features)
-    return issubclass(found, ExtendedFeatures) and not issubclass(found, LocalFeatures)
+def gives_turns(features: str) -> bool:
+    """Return whether robots take turns in a common order by a set; raises as `make_extractor`."""
+    return _feature_set(features).gives_turns
 
 
 def known_names(features: str) -> tuple[str, ...]:

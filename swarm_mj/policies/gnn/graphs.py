@@ -63,6 +63,7 @@ class FeatureExtractor(ABC):
     names: ClassVar[tuple[str, ...]]  # of the features, in order; there are F
     uses: ClassVar[str] = "its buffer"  # what they are made of, in a few words
     remembers_packets: ClassVar[bool] = False  # whether it keeps N² numbers for each robot
+    gives_turns: ClassVar[bool] = False  # whether an order of the team and the clock let one speak
 
     def __init__(self, mission: Mission) -> None:
         """Take the mission whose area, duration and range normalise the features."""

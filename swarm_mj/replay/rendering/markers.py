@@ -203,8 +203,7 @@ def draw_markers(
                 _add_line(scene, start, end, theme.shown(style.colour), line_pixels)
     # Last, for of very dense teams there is no room for all; robots and packets go first.
     room = scene.maxgeom - scene.ngeom
-    lines_m, colours = footage.mismatch_lines(row)
-    lines_m = lifted(lines_m, ROBOT_HEIGHT * above_m)
+    lines_m, colours = footage.mismatch_lines(row, ROBOT_HEIGHT * above_m)
     for (start, end), colour in zip(lines_m[:room], colours[:room], strict=True):
         _add_line(scene, start, end, colour, line_pixels)
 
@@ -238,22 +237,22 @@ def _draw_robots(
     colours = footage.colours[row]
     speed = np.linalg.norm(velocity_mps, axis=1, keepdims=True)
     way_m = HEADING * picture_m * velocity_mps / np.maximum(speed, 1e-9)
+    up_m = footage.heights_m(row)
     for i, (where, way) in enumerate(zip(footage.position_m[row], way_m, strict=True)):
         radius_m = (OBSERVER if i == footage.ego else ROBOT) * picture_m
-        up_m = 0.0 if footage.height_m is None else float(footage.height_m[row, i])
-        height_m = up_m + ROBOT_HEIGHT * radius_m
+        height_m = up_m[i] + ROBOT_HEIGHT * radius_m
         size_m = np.array([radius_m, radius_m, 0.0])
         colour = theme.ego if i == footage.ego else colours[i]
         if theme.rim is not None:
             flat_m = RIM_HEIGHT * radius_m
             rim_m = np.array([RIM * radius_m, flat_m, 0.0])
-            _add(scene, DISC, theme.rim, rim_m, np.append(where, flat_m))
+            _add(scene, DISC, theme.rim, rim_m, np.append(where, up_m[i] + flat_m))
         _add(scene, DISC, colour, size_m, np.append(where, height_m))
         if footage.is_cut_off[row, i]:
             flat_m = HALO_HEIGHT * radius_m
             wide_m = palette.HALO * radius_m
             size_m = np.array([wide_m, flat_m, 0.0])
-            _add(scene, DISC, palette.CUT_OFF, size_m, np.append(where, flat_m))
+            _add(scene, DISC, palette.CUT_OFF, size_m, np.append(where, up_m[i] + flat_m))
         if np.any(way):
             start = np.append(where, height_m)
             end = np.append(where + way, height_m)

@@ -101,8 +101,8 @@ class Movie(ExitStack):
             drawing.draw_title(draw, footage, row, box, self._text, curve, theme)
             if self._chases:  # from nearby, most robots are behind the camera or far
                 continue
-            ground_m = lifted(footage.position_m[row], 0.0)
-            robots = renderer.camera(footage, row).pixels(ground_m) + np.array(
+            place_m = lifted(footage.position_m[row], footage.heights_m(row))
+            robots = renderer.camera(footage, row).pixels(place_m) + np.array(
                 [box.left, self._scene_top]
             )
             drawing.draw_shortfalls(draw, robots, *footage.shortfalls(row), self._text, theme)

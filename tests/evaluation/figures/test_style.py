@@ -15,7 +15,7 @@ from synthetic import everything
 
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.figures.drawing import draw
-from swarm_mj.evaluation.figures.style import FAINT, LOOKS, code, look_of, save, styled
+from swarm_mj.evaluation.figures.style import FAINT, LOOKS, code, draw_to, look_of, save, styled
 from swarm_mj.evaluation.published import FORMATS, RESULT_FIGURES, points
 from swarm_mj.policies.about import FEW_BYTES, About, Look
 from swarm_mj.policies.policy import CentralisedPolicy
@@ -93,6 +93,22 @@ def test_files_are_whole_and_say_what_their_caption_says(tmp_path):
     with Image.open(png) as picture:
         assert picture.size[0] == 1800
         assert picture.text["Description"] == caption
+
+
+def test_a_figure_is_drawn_once_and_only_where_both_files_can_be_written(tmp_path):
+    drawn = []
+
+    def figure():
+        drawn.append(draw(RESULT_FIGURES["fig4"], everything()))
+        return drawn[-1]
+
+    (tmp_path / "taken.png").mkdir()
+    with pytest.raises(ValueError, match=r"figure .*taken\.png"):
+        draw_to(tmp_path / "taken", figure)
+    assert not drawn
+    draw_to(tmp_path / "free", figure)
+    assert len(drawn) == 1
+    assert {path.name for path in tmp_path.glob("free*")} == {"free.svg", "free.png"}
 
 
 def test_captions_name_each_commit_once_and_those_that_were_changed():

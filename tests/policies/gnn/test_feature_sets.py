@@ -12,6 +12,7 @@ from swarm_mj.policies.gnn.extended_features import ExtendedFeatures, LocalFeatu
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
     check_unchanged,
+    gives_turns,
     known_names,
     make_extractor,
     num_features,
@@ -34,6 +35,10 @@ from swarm_mj.policies.gnn.turn_features import TurnFeatures
 def test_a_set_is_found_by_its_name_and_has_so_many_features(features, kind, count):
     assert type(make_extractor(features, paper())) is kind
     assert num_features(features) == count
+
+
+def test_only_the_extended_features_give_turns_in_an_order_of_the_team():
+    assert [name for name in FEATURE_SETS if gives_turns(name)] == ["extended"]
 
 
 @pytest.mark.parametrize("refuse", [lambda name: make_extractor(name, paper()), num_features])

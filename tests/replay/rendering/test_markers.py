@@ -79,6 +79,20 @@ def test_links_that_surprise_are_drawn_until_there_is_no_room():
         np.testing.assert_allclose(geoms[-1].rgba[:3] * 255.0, palette.UNBELIEVED)
 
 
+def test_what_marks_bodies_is_as_high_as_they_are():
+    """All but packets, whose ends are recorded in space: rims, discs, halos and links."""
+    seen = moment([(0.0, 0.0), (100.0, 0.0)])
+    seen.is_cut_off[0, 1] = True
+    mismatch = LinkMismatch(np.array([1]), np.array([(0, 0, 1, 90, 5, False)], LINK))
+    seen = replace(seen, mismatch=mismatch)
+    on_floor = drawn(seen, theme=LIGHT)
+    in_air = drawn(replace(seen, height_m=np.array([[20.0, 50.0]])), theme=LIGHT)
+    assert len(on_floor) == 6  # a rim and a disc for each, a halo and a line
+    risen_m = [high.pos[2] - low.pos[2] for high, low in zip(in_air, on_floor, strict=True)]
+    np.testing.assert_allclose(risen_m, [20.0, 20.0, 50.0, 50.0, 50.0, 20.0], rtol=1e-5)
+    assert end(in_air[-1])[2] - end(on_floor[-1])[2] == pytest.approx(50.0, rel=1e-5)
+
+
 def test_a_packet_is_an_arc_of_lines_and_a_heading_one_more():
     seen = moment([(0.0, 0.0), (100.0, 0.0)], [(0, 1)])
     arc = drawn(seen)[2:]

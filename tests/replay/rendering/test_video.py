@@ -98,6 +98,21 @@ def test_links_that_surprise_and_their_shortfalls_are_seen(blocked):
 
 
 @with_opengl
+def test_the_numbers_of_bodies_stand_as_high_as_they_are(monkeypatch, high):
+    """A robot in the air is seen farther up than one below it on the floor."""
+    seen = []
+    monkeypatch.setattr(drawing, "draw_shortfalls", lambda _draw, robots, *_: seen.append(robots))
+    on_floor = replace(high.log, height_m=np.zeros_like(high.log.height_m))
+    for footage in (high.log, on_floor):
+        with Movie([footage], STYLE) as movie:
+            movie.picture([5])
+    in_air, below = seen
+    is_high = high.log.height_m[5] > 5.0
+    assert np.any(is_high)
+    assert np.all(in_air[is_high, 1] < below[is_high, 1] - 1.0)
+
+
+@with_opengl
 def test_from_nearby_robots_move_between_windows_too(high):
     with Movie([high.log], replace(STYLE, camera="chase")) as movie:
         pictures = [movie.picture([5.0 + k / 3.0]) for k in range(4)]
