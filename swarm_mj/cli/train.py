@@ -14,6 +14,7 @@ from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags, values_of
 from swarm_mj.cli.options import Given, nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
+from swarm_mj.cli.train_sweep import run_sweep
 from swarm_mj.evaluation.engines import GROUP, EngineOptions
 from swarm_mj.learning import run_folder
 from swarm_mj.learning.run_folder import Limits, TrainingRun
@@ -149,8 +150,6 @@ def _train(
 
 def _sweep(options: TrainOptions, path: Path) -> int:
     """Run several trainings; return the exit code."""
-    from swarm_mj.cli.train_sweep import run_sweep
-
     alone = TrainOptions(
         out=options.out,
         sweep=path,
@@ -165,7 +164,14 @@ def _sweep(options: TrainOptions, path: Path) -> int:
         raise ValueError(
             f"with --sweep, options of trainings stand in {path}; leave out the others"
         )
-    return run_sweep(path, options.out, options.engine_with([]), is_resumed=options.resume)
+
+    def check_training(one: TrainOptions) -> None:
+        if one.live is not None:
+            raise ValueError(f"sweep {path}: {ONE_LIVE}")
+        asked_run(one)
+
+    engine = options.engine_with([])
+    return run_sweep(path, options.out, engine, check_training, is_resumed=options.resume)
 
 
 def asked_run(options: TrainOptions) -> TrainingRun:

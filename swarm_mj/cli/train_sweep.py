@@ -3,7 +3,7 @@
 import shlex
 import tempfile
 import tomllib
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
@@ -106,24 +106,35 @@ def _name(chosen: dict[str, Any]) -> str:
     return "_".join(parts) or "training"
 
 
-def run_sweep(path: Path, out: Path, engine: Engine, *, is_resumed: bool) -> int:
+def run_sweep(
+    path: Path,
+    out: Path,
+    engine: Engine,
+    check_training: Callable[[Any], object],
+    *,
+    is_resumed: bool,
+) -> int:
     """Train what a file asks for, each in a folder of its own; return the exit code.
+
+    Args:
+        path: The file.
+        out: The folder of these folders.
+        engine: Where trainings run.
+        check_training: Raises ValueError for options of `swarm-mj train` that cannot be trained
+            with. All are checked before anything is trained.
+        is_resumed: Whether trainings that have begun go on.
 
     Raises:
         ValueError: An option in the file is unknown, or cannot be trained with.
         OSError: A file cannot be read or written, or the engine could not do all.
     """
-    from swarm_mj.cli.train import ONE_LIVE, asked_run
-
     commands: list[list[str]] = []
     for name, options in read_sweep(path).items():
         folder = (out / name).resolve()  # processes elsewhere have other current folders
         has_begun = is_resumed and (folder / SETTINGS).exists()
         command = ["train", *options, "--out", str(folder), *(["--resume"] if has_begun else [])]
-        _, asked = parse(command)
-        if asked.live is not None:
-            raise ValueError(f"sweep {path}: {ONE_LIVE}")
-        asked_run(asked)  # whatever is wrong is said before anything is trained
+        _, options_of_it = parse(command)
+        check_training(options_of_it)
         commands.append(command)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:

@@ -5,6 +5,7 @@ import sys
 import pytest
 
 from swarm_mj.cli import main
+from swarm_mj.cli.train import asked_run
 from swarm_mj.cli.train_sweep import read_sweep, run_sweep, train_apart
 from swarm_mj.learning.run_folder import read_curve, read_run
 
@@ -169,7 +170,7 @@ def test_an_engine_that_breaks_down_tells_of_resume(sweep):
             yield
 
     with pytest.raises(OSError, match=r"^Ray gave up; --resume goes on with the trainings$"):
-        run_sweep(sweep / "sweep.toml", sweep / "runs", Broken(), is_resumed=False)
+        run_sweep(sweep / "sweep.toml", sweep / "runs", Broken(), asked_run, is_resumed=False)
 
 
 def test_ctrl_c_tells_of_resume(sweep, capsys):
@@ -179,7 +180,7 @@ def test_ctrl_c_tells_of_resume(sweep, capsys):
             yield
 
     path = sweep / "sweep.toml"
-    assert run_sweep(path, sweep / "runs", Interrupted(), is_resumed=False) == 130
+    assert run_sweep(path, sweep / "runs", Interrupted(), asked_run, is_resumed=False) == 130
     assert capsys.readouterr().err.startswith("Interrupted; --resume goes on from each training's")
 
 
@@ -196,7 +197,7 @@ def test_a_logger_is_loaded_before_trainings_so_that_it_travels_with_them(sweep,
     text = SWEEP.replace("[sweep]", "logger = 'keeping_lines:Lines'\n[sweep]")
     (sweep / "sweep.toml").write_text(text)
     with pytest.raises(OSError, match="enough is seen"):
-        run_sweep(sweep / "sweep.toml", sweep / "runs", Ends(), is_resumed=False)
+        run_sweep(sweep / "sweep.toml", sweep / "runs", Ends(), asked_run, is_resumed=False)
     (sweep / "sweep.toml").write_text(text.replace(":Lines", ":Line"))
     assert train("--sweep", "sweep.toml", "--out", "runs") == 2
     assert "keeping_lines.py has no Line; did you mean Lines?" in capsys.readouterr().err
