@@ -110,6 +110,15 @@ def open_viewer(where: str, console: Console) -> Iterator[LiveViewer]:
         yield viewer
 
 
+def keep_open(viewer: LiveViewer) -> int:
+    """Say that the viewer stays, and wait until it is closed; return the exit code."""
+    if viewer.page is None:
+        plain_console().print("The viewer stays open; close it to end.")
+    else:
+        plain_console().print(f"The viewer stays at {viewer.page}\nCtrl-C ends it.")
+    return viewer.wait()
+
+
 def viewer_to_keep(where: str | bool, console: Console) -> LiveViewer:
     """Open a viewer that stays open until Python ends, and say where; raise as `open_viewer`."""
     asked = view.WINDOW if where is True else str(where)

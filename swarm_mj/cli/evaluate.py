@@ -13,7 +13,14 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.flight import Flight, fly_mission
-from swarm_mj.api.live import LiveFlight, check_live, live_option, open_viewer, speed_option
+from swarm_mj.api.live import (
+    LiveFlight,
+    check_live,
+    keep_open,
+    live_option,
+    open_viewer,
+    speed_option,
+)
 from swarm_mj.cli.mission_options import NAMES, OTHERS, PolicyOptions, several_missions
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.evaluation import flying
@@ -124,7 +131,7 @@ def run(options: EvaluateOptions) -> int:
         code = _show_first(options, study, viewer, console)
         if code == DONE:
             code = run_study(options, study)
-        return viewer.wait() if code == DONE else code
+        return keep_open(viewer) if code == DONE else code
 
 
 def _show_first(

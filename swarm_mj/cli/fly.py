@@ -13,7 +13,14 @@ from typing import ClassVar
 from rich.console import Console
 
 from swarm_mj.api.flight import Flight, flight_needs, fly_mission
-from swarm_mj.api.live import LiveFlight, check_live, live_option, open_viewer, speed_option
+from swarm_mj.api.live import (
+    LiveFlight,
+    check_live,
+    keep_open,
+    live_option,
+    open_viewer,
+    speed_option,
+)
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.mission import Mission
@@ -85,7 +92,7 @@ def run(options: FlyOptions) -> int:
         name = path.stem if path else "live"
         live = LiveFlight(viewer, name, has_file=path is not None, speed=options.speed)
         code = _fly(options, path, console, flown_as, live)
-        return viewer.wait() if code == DONE else code
+        return keep_open(viewer) if code == DONE else code
 
 
 def _fly(

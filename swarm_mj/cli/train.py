@@ -9,7 +9,7 @@ from typing import ClassVar, get_args
 
 from rich.console import Console
 
-from swarm_mj.api.live import check_live, live_option, open_viewer
+from swarm_mj.api.live import check_live, keep_open, live_option, open_viewer
 from swarm_mj.cli import train_settings
 from swarm_mj.cli.mission_options import mission_flags, values_of
 from swarm_mj.cli.options import Given, nested
@@ -114,7 +114,7 @@ def run(options: TrainOptions) -> int:
     with open_viewer(options.live, console) as viewer:
         code = _train(options, asked, console, partial(trains, live=LiveTraining(viewer)))
         if code == DONE:
-            viewer.wait()  # whether it failed or was closed, the run has not
+            keep_open(viewer)  # whether it failed or was closed, the run has not
         return code
 
 

@@ -148,7 +148,7 @@ class _Count(Listener):
 
     def on_start(self, event: Event) -> None:  # noqa: ARG002 - numba's
         self._number += 1
-        self._say(f"Compiling the simulation, once for all flights: function {self._number} ...")
+        self._say(f"Compiling what is new here, once for later runs: function {self._number} ...")
 
     def on_end(self, event: Event) -> None:
         """Say nothing more."""

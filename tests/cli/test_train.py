@@ -263,6 +263,7 @@ def test_a_run_that_is_shown_waits_for_its_viewer_in_the_end(viewer, capsys):
     assert (viewer.num_shown, viewer.num_waits) == (2, 1)
     printed = capsys.readouterr()
     assert "Open P\nCtrl-C ends it." in printed.out
+    assert printed.out.endswith("The viewer stays at P\nCtrl-C ends it.\n")
     assert "policy kept" in printed.out
     assert train("--out", "r", "--resume", "--live", "web") == 0
     assert (viewer.num_shown, viewer.num_waits) == (3, 2)
