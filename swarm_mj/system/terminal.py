@@ -100,7 +100,7 @@ class WorkBar:
             TextColumn("{task.fields[bar].shown_what}", markup=False),
             BarColumn(BAR_WIDTH),
             *([TextColumn(count, markup=False)] if unit else []),
-            TextColumn("{task.fields[bar].text}", markup=False),
+            TextColumn("{task.fields[bar].shown_text}", markup=False),
             TimeRemainingColumn(),
             console=console,
             speed_estimate_period=SPEED_OVER_S,
@@ -109,6 +109,7 @@ class WorkBar:
         )
         self._id = self._bar.add_task("", total=total, completed=int(completed), bar=self)
         self._done = 0  # and not counted yet
+        self._counted_text = ""  # what `text` was when work was last counted
         self._next_count_s = 0.0
 
     def __enter__(self) -> "WorkBar":
@@ -141,6 +142,12 @@ class WorkBar:
     def _count(self) -> None:
         self._bar.advance(self._id, self._done)
         self._done = 0
+        self._counted_text = self.text
+
+    @property
+    def shown_text(self) -> str:
+        """The text beside the bar, of the moment whose count it shows."""
+        return self._counted_text if self._done > 0 else self.text
 
     def move_to(self, completed: float | int) -> None:
         """Set how much work is done in all."""

@@ -131,3 +131,18 @@ def test_the_bar_counts_a_burst_of_work_at_its_end_and_a_tenth_of_a_second_later
     with bar:
         bar.advance()
     assert bar._bar.tasks[0].completed == 17
+
+
+def test_the_text_is_of_the_moment_whose_count_is_shown(monkeypatch):
+    """A burst of work is not counted at once, and neither is what it says."""
+    now_s = [0.0]
+    monkeypatch.setattr(terminal.time, "monotonic", lambda: now_s[0])
+    with WorkBar("Flying", 10.0, "windows", console=Console(file=io.StringIO())) as bar:
+        for age in ("0.5", "1.0", "1.5"):
+            bar.text = f"age {age}"
+            bar.advance()
+        assert bar.shown_text == "age 0.5"
+        now_s[0] = 1.0
+        bar.text = "age 2.0"
+        bar.advance()
+        assert bar.shown_text == "age 2.0"
