@@ -64,7 +64,7 @@ def run(options: ExportOptions) -> int:
         for file, content in contents.items():
             write_bytes(file, content)
     for file, content in contents.items():
-        size = f"{len(content) / 1e6:.1f} MB"
+        size = f"{len(content) / 1e3:,.0f} kB"
         plain_console().print(f"Wrote {shlex.quote(str(file))}: {size}")
     return DONE
 

@@ -193,8 +193,9 @@ def _legend(results: Sequence[Result], columns: Sequence[Shown]) -> Iterator[str
             yield said(column.meaning, results[0])
     for column in columns:
         if column.applies is not None:
-            # Each sentence once, in the order of the results.
-            meanings = dict.fromkeys(said(column.meaning, result) for result in results)
+            # Each sentence once, in the order of the results that have such a column.
+            having = [result for result in results if _applies(column, result)]
+            meanings = dict.fromkeys(said(column.meaning, result) for result in having)
             yield from filter(None, meanings)
     if any(number(result.aoi_floor_mean) not in (NONE, "0.00") for result in results):
         yield (

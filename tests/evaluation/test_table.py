@@ -117,6 +117,17 @@ def test_the_freshest_comes_first_in_each_regime(printed):
     assert sum("preset paper: 1 robots" in line for line in lines) == 2
 
 
+def test_only_columns_that_are_shown_are_explained(printed):
+    resting = " ".join(" ".join(printed([some_result("a", 3.0)], 200, is_wide=False)).split())
+    assert "Heard: packets" in resting
+    assert "Agreed:" not in resting
+    flocks = " ".join(
+        " ".join(printed([some_result("a", 3.0, task="flocking")], 200, is_wide=False)).split()
+    )
+    assert "Heard:" not in flocks
+    assert "Agreed: flocks" in flocks
+
+
 def test_titles_of_teams_at_rest_say_how_they_move_only_if_that_was_asked_for(printed):
     at_rest = {"task": "stationary", "velocity_ratio": 0.15, "boundary": "reflect"}
     moving = at_rest | {"task": "random-walk"}
