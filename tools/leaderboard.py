@@ -27,6 +27,7 @@ from swarm_mj.system.writing import write_text
 
 ROOT = Path(__file__).resolve().parent.parent
 STUDY = "benchmark"
+AGAIN = "`make leaderboard`, without that file,"
 TEXT = """\
 # Leaderboard
 
@@ -69,7 +70,7 @@ def table(folder: Path, /) -> str:
     for name in sorted(scores, key=lambda name: scores[name]):
         ages = [_age(each) for each in by_policy[name]]
         lines.append((f"`{name}`", information_of(name), f"{scores[name]:.2f}", *ages))
-    return f"{markdown_table(heads, lines, right_from=2)}\n\n{origin(rows)}"
+    return f"{markdown_table(heads, lines, right_from=2)}\n\n{origin(rows, again=AGAIN)}"
 
 
 def kinds_of_missions() -> dict[str, Mission]:

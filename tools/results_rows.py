@@ -78,8 +78,13 @@ def _is(found: object, wanted: object) -> bool:
         return str(found) == str(wanted)
 
 
-def origin(rows: Sequence[Row]) -> str:
-    """Return who made these numbers, and how to make them again; the paper's have no such line."""
+def origin(rows: Sequence[Row], again: str | None = None) -> str:
+    """Return who made these numbers, and how to make them again; the paper's have no such line.
+
+    Args:
+        rows: What a table shows.
+        again: The command that flies them, as Markdown; None is `make results` with their names.
+    """
     ours = [row for row in rows if not row["is_published"]]
     said = []
     for name in dict.fromkeys(row["results"] for row in ours):
@@ -88,8 +93,9 @@ def origin(rows: Sequence[Row]) -> str:
     commits = " and ".join(sorted({str(row["commit"]) for row in ours}))
     named = dict.fromkeys(row["results"] for row in ours if row["results"] not in NOT_FLOWN)
     studies = " ".join(dict.fromkeys(map(study_of, named)))
-    again = f' `make results STUDIES="{studies}"` flies them again.' if studies else ""
-    return f"*From {', '.join(said)}; commit {commits}.{again}*"
+    command = again or (f'`make results STUDIES="{studies}"`' if studies else None)
+    ending = f" {command} flies them again." if command else ""
+    return f"*From {', '.join(said)}; commit {commits}.{ending}*"
 
 
 def study_of(results: str) -> str:

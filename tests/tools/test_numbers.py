@@ -32,10 +32,12 @@ REWARDS = {QUICK / "rewards.csv"}
 BODIES = {RESULTS / "bodies.csv"}
 CRASHES = {RESULTS / "crashes.csv"}
 FALLS = {RESULTS / "falls.csv"}
+BENCHMARK = {RESULTS / "benchmark.csv"}
+ROUTES = {RESULTS / "routes.csv"}
 PEERS = {RESULTS / "peers.csv"}
 NEWER = (
     *(CONVERGING, LOOKAHEAD, INDEX, ONE, AT_ONE_POINT, ONE_ELSEWHERE, ONE_IN_CITY, RECIPES),
-    *(HOPS, REWARDS, BODIES, CRASHES, FALLS, PEERS),
+    *(HOPS, REWARDS, BODIES, CRASHES, FALLS, PEERS, BENCHMARK, ROUTES),
 )
 
 
