@@ -133,8 +133,8 @@ def run_sweep(
         folder = (out / name).resolve()  # processes elsewhere have other current folders
         has_begun = is_resumed and (folder / SETTINGS).exists()
         command = ["train", *options, "--out", str(folder), *(["--resume"] if has_begun else [])]
-        _, options_of_it = parse(command)
-        check_training(options_of_it)
+        _, asked = parse(command)
+        check_training(asked)
         commands.append(command)
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
