@@ -144,7 +144,7 @@ def check_in_use(
             own = called(spec.name)
             other = called(switch.name)
             ways = f"give that too, or leave {own} out"
-            raise ValueError(f"{own} counts only with {other} {switch.state or 'above 0'}; {ways}")
+            raise ValueError(f"{own} counts only with {other} {switch.needed}; {ways}")
 
 
 def mission_flags(*missions: Mission) -> str:

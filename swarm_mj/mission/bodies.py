@@ -7,7 +7,7 @@ from typing import NamedTuple, TypedDict
 from swarm_mj.mission.geometry import PLANE, SPACE
 from swarm_mj.mission.labels import NEW
 from swarm_mj.mission.team import Team
-from swarm_mj.system.fields import above_zero, setting
+from swarm_mj.system.fields import above_zero, other_than, setting
 
 LEAST_HEIGHT_M = 0.5  # of robots that fly: below it a set point does not sink
 POINT = "point"  # the paper's robot: a mass without size, heading or height
@@ -57,6 +57,7 @@ class Bodies(Team):
         low=LEAST_HEIGHT_M,
         high=1000.0,
         source=NEW,
+        counts_with=other_than(robot, POINT),
     )
     height_range_m: float = setting(
         0.0,
@@ -66,6 +67,7 @@ class Bodies(Team):
         low=0.0,
         high=1000.0,
         source=NEW,
+        counts_with=other_than(robot, POINT),
     )
     robot_spread: float = setting(
         0.0,
@@ -75,15 +77,17 @@ class Bodies(Team):
         low=0.0,
         high=0.2,
         source=NEW,
+        counts_with=other_than(robot, POINT),
     )
     wind_mps: float = setting(
         0.0,
-        "mean wind, to the east; it pushes bodies, not points",
+        "mean wind, to the east",
         label="wind",
         unit="m/s",
         low=0.0,
         high=50.0,
         source=NEW,
+        counts_with=other_than(robot, POINT),
     )
     gust_mps: float = setting(
         0.0,
@@ -93,6 +97,7 @@ class Bodies(Team):
         low=0.0,
         high=20.0,
         source=NEW,
+        counts_with=other_than(robot, POINT),
     )
     gust_s: float = setting(
         3.0,

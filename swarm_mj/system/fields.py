@@ -32,10 +32,11 @@ ABOUT = "about"  # the one key of a field's metadata
 
 @dataclass(frozen=True)
 class Switch:
-    """The state of another field for a field to count: a number above 0, or a choice."""
+    """The state of another field for a field to count: a number above 0, or a text."""
 
     field: Field[Any]
-    state: str = ""  # one of its choices; "" is any number above 0
+    state: str = ""  # a text that it may be; "" is any number above 0
+    is_other: bool = False  # whether it must be any text but this one
 
     @property
     def name(self) -> str:
@@ -45,7 +46,16 @@ class Switch:
     def is_on(self, settings: object) -> bool:
         """Return whether it is so in some settings; of joined choices, one is enough."""
         value = getattr(settings, self.name)
-        return self.state in value.split(",") if self.state else value > 0
+        if not self.state:
+            return value > 0
+        return (self.state in value.split(",")) is not self.is_other
+
+    @property
+    def needed(self) -> str:
+        """What the other field must be, in words."""
+        if not self.state:
+            return "above 0"
+        return f"other than {self.state}" if self.is_other else self.state
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -63,7 +73,8 @@ class Meaning:
     high: float | int | None = None  # the largest; both ends are given, or none
     choices: Collection[str] = ()  # the texts that are allowed, if not all are
     is_joined: bool = False  # whether several choices may be joined by commas
-    counts_with: Switch | None = None  # what must be on for this to count: see `above_zero`
+    # What must be on for this to count: see `above_zero`, `set_to` and `other_than`.
+    counts_with: Switch | None = None
     former: tuple[str, ...] = ()  # its names in earlier releases, in files and on command lines
     group: str = ""  # the heading that it stands under in the help
     metavar: str = ""  # what stands for its value in the help
@@ -145,6 +156,13 @@ def set_to(switch: object, state: str) -> Switch:
     if not isinstance(switch, Field) or state not in choices:
         raise TypeError(f"counts_with needs one of {', '.join(choices)}, not {state!r}")
     return Switch(switch, state)
+
+
+def other_than(switch: object, state: str) -> Switch:
+    """Return that a field counts where another one, as of `above_zero`, is a text but this one."""
+    if not isinstance(switch, Field) or not isinstance(switch.default, str):
+        raise TypeError(f"counts_with needs a text that is a `setting`, not {switch!r:.80}")
+    return Switch(switch, state, is_other=True)
 
 
 def meaning_of(spec: Field[Any]) -> Meaning:

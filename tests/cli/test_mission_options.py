@@ -173,6 +173,8 @@ SWITCHES = {
     "--high-power-db 3": "--high-power-fraction above 0",
     "--map-offset-m 3": "--prior-knowledge map",
     "--position-noise-s 3": "--position-noise-m above 0",
+    "--wind-mps 5": "--robot other than point",
+    "--height-range-m 5": "--robot other than point",
 }
 
 

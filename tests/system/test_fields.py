@@ -16,6 +16,7 @@ from swarm_mj.system.fields import (
     former_names,
     kind_of,
     meaning_of,
+    other_than,
     same_as,
     set_to,
     setting,
@@ -85,6 +86,8 @@ class Oven:
     fan_rpm: float = setting(900.0, low=1.0, high=3000.0, counts_with=set_to(heat, "fan"))
     steam: float = setting(0.0, low=0.0, high=1.0)
     steam_s: float = setting(5.0, low=1.0, high=60.0, counts_with=above_zero(steam))
+    dish: str = setting("tray", "")
+    lid_mm: float = setting(2.0, low=1.0, high=9.0, counts_with=other_than(dish, "tray"))
     light: bool = False
 
 
@@ -93,11 +96,18 @@ def test_a_field_says_with_which_other_one_it_counts():
     assert {name: each.name for name, each in switches.items() if each} == {
         "fan_rpm": "heat",
         "steam_s": "steam",
+        "lid_mm": "dish",
     }
+    assert [each.needed for each in switches.values() if each] == [
+        "fan",
+        "above 0",
+        "other than tray",
+    ]
     for oven, counting in (
         (Oven(heat="top"), set()),
         (Oven(heat="fan"), {"fan_rpm"}),
         (Oven(heat="top,fan", steam=0.5), {"fan_rpm", "steam_s"}),  # of joined choices, one
+        (Oven(dish="pot"), {"lid_mm"}),
     ):
         assert {name for name, each in switches.items() if each and each.is_on(oven)} == counting
 
@@ -111,6 +121,8 @@ def test_a_slip_in_a_declaration_is_an_error_at_once():
         above_zero(3)
     with pytest.raises(TypeError, match="needs a number"):  # of a text, nothing is above 0
         above_zero(Oven.__dataclass_fields__["heat"])
+    with pytest.raises(TypeError, match="needs a text that is a `setting`, not "):
+        other_than(Oven.__dataclass_fields__["steam"], "tray")
     with pytest.raises(TypeError, match="unexpected keyword argument 'lable'"):
         setting(3, lable="a")
 
