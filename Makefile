@@ -56,14 +56,18 @@ $(READY): pyproject.toml tools/constraints.txt tools/hashes-uv.txt tools/hashes.
 	@echo "Setting up .venv (a minute, once; 2.4 GB, or 6 GB with CUDA) ..."
 	@$(PYTHON) -m venv .venv
 	@$(PIP) --no-deps --require-hashes --requirement tools/hashes-uv.txt
+	@echo "  packages ..."
 	@$(call hashed,tools/hashes.txt)
+	@echo "  torch ..."
 	@$(PIP) --constraint tools/constraints.txt torch
+	@echo "  swarm_mj ..."
 	@$(PIP) --no-deps --no-build-isolation --editable .
 	@touch $@
 	@echo "Done. make fly flies a mission; after 'source .venv/bin/activate', swarm-mj --help says what else there is."
 
 # What the tests, the checks and the documentation need on top.
 $(DEV): $(READY) tools/hashes-dev.txt
+	@echo "Adding what tests, checks and the documentation need ..."
 	@$(call hashed,tools/hashes-dev.txt)
 	@touch $@
 
