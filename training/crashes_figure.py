@@ -26,7 +26,7 @@ from swarm_mj.evaluation.figures.style import (
     write_caption,
 )
 from swarm_mj.evaluation.markdown_table import markdown_table
-from swarm_mj.evaluation.results import Result, config_of
+from swarm_mj.evaluation.results import Result, mission_field
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
@@ -54,7 +54,7 @@ class CrashesFigure:
 
 def at_density(found: Sequence[Result], density_per_km2: float) -> list[Result]:
     """Return the results of teams of a density, by how old their news was."""
-    its = [each for each in found if config_of(each)["density_per_km2"] == density_per_km2]
+    its = [each for each in found if mission_field(each, "density_per_km2") == density_per_km2]
     return sorted(its, key=news_age)
 
 

@@ -22,7 +22,7 @@ from matplotlib.figure import Figure
 from swarm_mj.cli import script
 from swarm_mj.evaluation.figures.style import code, look_of, save, styled, write_caption
 from swarm_mj.evaluation.markdown_table import markdown_table
-from swarm_mj.evaluation.results import Result, config_of
+from swarm_mj.evaluation.results import Result, mission_field
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
@@ -68,9 +68,9 @@ class ImpairmentsFigure:
 
 def impairment(result: Result) -> str:
     """Return the name of the one impairment that a result's missions have, or `none`."""
-    config = config_of(result)
     for field, name in NAMES.items():
-        if value := config.get(field):
+        value = mission_field(result, field)
+        if value:
             return name.format(1e3 * value if field == "clock_offset_s" else value)
     return NONE if result.arena == "open" else CORRECT_MAP
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from swarm_mj.control.motion import Flocking
 from swarm_mj.evaluation.measurements import HOW, Measurements, column, later_column
+from swarm_mj.mission import Mission
 from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.surroundings import OPEN
@@ -22,6 +23,7 @@ from swarm_mj.protocol.mission_costs import (
     MissionCost,
 )
 from swarm_mj.radio.words import radio_in_words
+from swarm_mj.system.arguments import check_names
 from swarm_mj.system.reading import read_json
 
 LARGER_PACKETS = "larger packets"  # said wherever such policies are shown
@@ -317,6 +319,21 @@ def is_flock(result: Result) -> bool:
 def has_own_cost(result: Result) -> bool:
     """Return whether the task has a cost of its own, and not a flock's velocity variance."""
     return result.task_cost_name not in (None, Flocking.cost_name)
+
+
+def mission_field(result: Result, name: str) -> Any:  # noqa: ANN401 - of any field
+    """Return a field of a result's mission; None where an older file lacks it.
+
+    Args:
+        result: One row of results, whose column `config` is read.
+        name: Of a field of `Mission`.
+
+    Raises:
+        TypeError: A mission has no such field; the message names the one most like it.
+        ValueError: The column is no JSON object.
+    """
+    check_names("Mission", [name], Mission.__dataclass_fields__)
+    return config_of(result).get(name)
 
 
 def config_of(result: Result) -> dict[str, Any]:

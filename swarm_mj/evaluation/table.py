@@ -13,10 +13,11 @@ from swarm_mj.evaluation.results import (
     LARGER_PACKETS,
     Result,
     carries_more,
-    config_of,
     has_memory,
+    mission_field,
 )
 from swarm_mj.evaluation.table_columns import BRIEF, NONE, WIDE, Shown, number, said
+from swarm_mj.mission import Mission
 from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.presets import paper
@@ -76,6 +77,7 @@ def print_results(
 def missions_title(result: Result) -> str:
     """Return the missions that a result is of, in lines: results of others are not compared."""
     parts = {
+        "density": _density(result),
         "radio": result.radio,
         "channel": result.channel,
         "controller": result.controller,
@@ -91,7 +93,7 @@ def missions_title(result: Result) -> str:
         if name:
             own += f",\n{kind} {name}"
     fates = ""
-    if config_of(result).get("collide"):
+    if mission_field(result, "collide"):
         fates += ", robots collide"
     if result.failure_fraction:
         fates += f", {result.failure_fraction:.0%} of the robots off half-way"
@@ -113,19 +115,32 @@ def missions_title(result: Result) -> str:
     )
 
 
+def _density(result: Result) -> str | None:
+    """Return how densely robots are spread, in words; None where it is the paper's."""
+    per_km2 = mission_field(result, "density_per_km2")
+    return None if per_km2 in (None, Mission().density_per_km2) else f"{per_km2:g}/km²"
+
+
+# What is said of robots with bodies, in this order, unless it is as usual: the numbers' fields.
+OF_BODIES = {
+    "height_range_m": "to {:g} m higher",
+    "wind_mps": "wind {:g} m/s",
+    "gust_mps": "gusts {:g} m/s",
+    "gust_s": "over {:g} s",
+    "robot_spread": "spread {:g}",
+}
+
+
 def _bodies(result: Result) -> str:
     """Return the robots' kind, how high they fly, and the wind, in words."""
-    config = config_of(result)
+    usual = Mission()
     said = result.robot
-    for name, words in (
-        ("height_m", "at {:g} m"),
-        ("height_range_m", "to {:g} m higher"),
-        ("wind_mps", "wind {:g} m/s"),
-        ("gust_mps", "gusts {:g} m/s"),
-        ("robot_spread", "spread {:g}"),
-    ):
-        value = config.get(name)
-        if value:
+    height_m = mission_field(result, "height_m")
+    if height_m is not None:
+        said += f", at {height_m:g} m"
+    for name, words in OF_BODIES.items():
+        value = mission_field(result, name)
+        if value is not None and value != getattr(usual, name):
             said += f", {words.format(value)}"
     return said
 

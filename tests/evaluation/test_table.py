@@ -1,12 +1,16 @@
 """Tables of results: whole at 100 columns, the freshest first, one per regime."""
 
-from dataclasses import fields
+import json
+from dataclasses import asdict, fields
+from types import SimpleNamespace
 from typing import get_args
 
 import pytest
 
-from swarm_mj.evaluation.results import Result
-from swarm_mj.evaluation.table import print_results
+from swarm_mj.evaluation.results import COMPUTATIONS, Result
+from swarm_mj.evaluation.table import missions_title, print_results
+from swarm_mj.mission import Mission, paper
+from swarm_mj.system.fields import meaning_of
 
 
 def some_result(policy, aoi_mean, **overrides):
@@ -233,6 +237,70 @@ def test_other_regimes_are_tables_of_their_own_and_say_so(printed, other, said):
     text = "\n".join(printed([some_result("a", 1.0, **plain | each) for each in ({}, other)], 100))
     assert text.count("preset paper: 1 robots") == 2
     assert text.count(said) == 1
+
+
+# Fields in which a number or a choice counts that has no switch, or whose values are not evident.
+AMONG_BODIES = {"robot": "quadrotor"}
+OTHER = {
+    "arena": {"arena": "blocks"},
+    "bit_rate": {"bit_rate": 1e5},
+    "burst_end": {"burst_begin": 0.02, "burst_end": 0.5},
+    "collide": {"physics": "contact", "collide": True},
+    "gust_s": AMONG_BODIES | {"gust_mps": 2.0, "gust_s": 9.0},
+    "high_power_db": {"high_power_fraction": 0.5, "high_power_db": 3.0},
+    "prior_knowledge": {"prior_knowledge": "start"},
+    "rician_k": {"fading": "rician", "rician_k": 3.0},
+    "robot": AMONG_BODIES,
+    "sensing_dbm": {"noise_dbm": -100.0, "sensing_dbm": -90.0},
+    "shadowing_distance_m": {"shadowing_db": 6.0, "shadowing_distance_m": 80.0},
+    "task": {"task": "flocking"},
+}
+
+
+def other_fields(spec):
+    """Fields of a mission of which the last is not as usual, and counts."""
+    if spec.name in OTHER:
+        return OTHER[spec.name]
+    about = meaning_of(spec)
+    if about.choices:
+        value = next(choice for choice in about.choices if choice != spec.default)
+    else:
+        middle = 0.3 * about.low + 0.7 * about.high
+        value = int(middle) if isinstance(spec.default, int) else middle
+    switch = about.counts_with
+    if switch is None:
+        needed = {}
+    elif switch.is_other:
+        needed = AMONG_BODIES
+    else:
+        needed = {switch.name: switch.state or 2.0}
+    return needed | {spec.name: value}
+
+
+def title_of(mission):
+    """The title of a mission's results: as they are made, but for what was measured."""
+    study = SimpleNamespace(episodes=3, seed=4)
+    own = SimpleNamespace(mission=mission, study=study, component=lambda _kind: None)
+    cells = {name: getattr(mission, name) for name in ("task", "preset")}
+    for name in list(COMPUTATIONS)[: list(COMPUTATIONS).index("probability")]:
+        if name != "policy":
+            cells[name] = COMPUTATIONS[name](own)
+    for name in ("arena", "radio", "prior_knowledge", "robot", "bit_rate"):
+        cells[name] = COMPUTATIONS[name](own)
+    none = dict.fromkeys(("channel", "controller", "scene", "pilot"))
+    return missions_title(
+        some_result("a", 1.0, **none, **cells, config=json.dumps(asdict(mission)))
+    )
+
+
+@pytest.mark.parametrize("spec", fields(Mission), ids=lambda spec: spec.name)
+def test_missions_that_differ_in_an_option_differ_in_their_title(spec):
+    if not meaning_of(spec).help:
+        return  # only presets set it, which the title names
+    other = other_fields(spec)
+    usual = {name: value for name, value in other.items() if name != spec.name}
+    titles = [title_of(paper(**{"task": "random-walk"} | given)) for given in (usual, other)]
+    assert titles[0] != titles[1]
 
 
 def test_the_title_says_which_missions(printed):
