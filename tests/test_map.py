@@ -103,7 +103,7 @@ def imports(path):
         ("mission/batched_rng", set()),
         ("mission/geometry", {"system.compiled"}),
         ("mission/placement", {"system.compiled", "mission.geometry", "mission.specification"}),
-        ("radio/reception", {"system.compiled"}),
+        ("radio/reception", {"system.compiled", "radio.fading"}),
         ("system/decibels", set()),
         (
             "radio/free_space",
@@ -156,13 +156,33 @@ YOUNGER = ("index",)  # tables of policies that those of the paper do not have y
 PAPERS_POLICIES = {*BASELINES, "gnn"}
 
 
-def test_public_classes_have_different_names():
+def names_of_aliases(node):
+    """The names of aliases of types that a statement of a module declares."""
+    targets = []
+    if isinstance(node, ast.AnnAssign):
+        targets = [node.target]
+    elif isinstance(node, ast.Assign) and not is_type_variable(node.value):
+        targets = node.targets
+    names = [target.id for target in targets if isinstance(target, ast.Name)]
+    return [name for name in names if name[0].isupper() and not name.isupper()]
+
+
+def is_type_variable(value):
+    """Whether a value is made by `TypeVar`, whose names are local to their modules."""
+    return isinstance(value, ast.Call) and isinstance(value.func, ast.Name)
+
+
+def test_public_classes_have_different_names_and_no_alias_has_one_of_them():
     homes = {}
+    aliases = {}
     for path in PACKAGE.rglob("*.py"):
         for node in ast.parse(path.read_text()).body:
             if isinstance(node, ast.ClassDef) and not node.name.startswith("_"):
                 homes.setdefault(node.name, []).append(home(path))
+            for name in names_of_aliases(node):
+                aliases.setdefault(name, []).append(home(path))
     assert {name: its for name, its in homes.items() if len(its) > 1} == {}
+    assert {name: its for name, its in aliases.items() if name in homes} == {}
 
 
 def ages(task, names):

@@ -126,13 +126,27 @@ FOR_THE_TYPE_CHECKER = [
         said='Cannot access attribute "p59"',
     ),
     Mistake(
+        name="a misspelt choice that nothing is ever equal to",
+        file="swarm_mj/physics/worlds.py",
+        before='if self._mission.physics == "exact":',
+        after='if self._mission.physics == "exct":',
+        said="Condition will always evaluate to False",
+    ),
+    Mistake(
+        name="knowledge that no mission can grant",
+        file="swarm_mj/simulation/swarm.py",
+        before='mission.grants("start")',
+        after='mission.grants("strat")',
+        said="'strat'",
+    ),
+    Mistake(
         name="a task without its controller",
         file="swarm_mj/mission/team.py",
         before='Task = Literal["stationary", "random-walk", "flocking"]',
         after='Task = Literal["stationary", "random-walk", "flocking", "patrol"]',
         said="patrol",
         told_in="swarm_mj/control/motion.py",
-        told_at="assert_never(unknown)",
+        told_at="assert_never(mission.task)",
     ),
     Mistake(
         name="a mission field whose help stands under a misspelt label",

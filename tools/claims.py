@@ -12,15 +12,12 @@ from results_rows import PAPER, Row, Rows, read, select
 from scipy.stats import spearmanr
 
 from swarm_mj.evaluation.markdown_table import markdown_table
+from swarm_mj.evaluation.published import BASELINES, FLOCKING, TRANSMIT_POWER
 from swarm_mj.system.reading import read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
 TRAINED = ROOT / "training" / "reproduce" / "quick"  # the trainings, a folder for each figure
-MAX_BYTES = 10_000_000
-BASELINES = ["mst", "random-flooding", "round-robin"]
 OURS = ["one GNN", "one GNN, seed 2", "one GNN, seed 3"]
-RANGE_RATIOS = (0.2, 0.25, 0.5, 0.75, 1.0)
-VELOCITY_RATIOS = (0.15, 0.25, 0.325, 0.5)
 INFORMED = ("planner", "planner --payload none", "greedy-oracle")
 
 
@@ -36,7 +33,7 @@ class Margin:
 
 def margins(folder: Path) -> str:
     """Return the GNNs' margins over the best baseline, here and as published (Fig. 4)."""
-    head = ["margin over the best baseline, by range ratio [km]", *map(_short, RANGE_RATIOS)]
+    head = ["margin over the best baseline, by range ratio [km]", *map(_short, TRANSMIT_POWER.xs)]
     rows: list[list[str]] = []
     for whose, ours, gnns, theirs in (
         ("ours", ["reproduce/quick/one"], OURS, ["paper-stationary"]),
@@ -44,11 +41,11 @@ def margins(folder: Path) -> str:
     ):
         in_windows = [f"{whose} [windows]"]
         in_percent = [f"{whose} [%]"]
-        for ratio in RANGE_RATIOS:
+        for ratio in TRANSMIT_POWER.xs:
             place = {"task": "stationary", "range_ratio": ratio, "figure": ["fig4", "none"]}
             found = margin(
                 select(read(ours, folder), {"policy": gnns} | place),
-                select(read(theirs, folder), {"policy": BASELINES} | place),
+                select(read(theirs, folder), {"policy": [*BASELINES]} | place),
             )
             in_windows.append(f"{found.windows:.1f} ± {found.windows_sem:.1f}")
             in_percent.append(f"{100.0 * found.share:.0f} ± {100.0 * found.share_sem:.0f}")
@@ -78,7 +75,7 @@ def margin(gnns: Rows, baselines: Rows) -> Margin:
 def correlation(folder: Path) -> str:
     """Return the rank correlations of age and velocity variance over the policies (Fig. 6)."""
     flown = read(["paper-flocking"], folder)
-    head = ["rank correlation, by velocity ratio", *map(_short, VELOCITY_RATIOS)]
+    head = ["rank correlation, by velocity ratio", *map(_short, FLOCKING.xs)]
     rows: list[list[str]] = []
     for name, left_out in (
         ("all policies", ()),
@@ -87,7 +84,7 @@ def correlation(folder: Path) -> str:
         policies = [row for row in flown if row["policy"] not in left_out]
         cells = [
             f"{rank_correlation(select(policies, {'velocity_ratio': ratio})):.2f}"
-            for ratio in VELOCITY_RATIOS
+            for ratio in FLOCKING.xs
         ]
         count = len({row["policy"] for row in policies})
         rows.append([f"{name} ({count})", *cells])
@@ -126,7 +123,7 @@ def trainings(_folder: Path, trained: Path = TRAINED) -> str:
 
 
 def _table(path: Path) -> list[dict[str, str]]:
-    return [row for _, row in read_rows(path, "table of trainings", MAX_BYTES)]
+    return [row for _, row in read_rows(path, "table of trainings")]
 
 
 def _listed(values: Iterable[Any]) -> str:

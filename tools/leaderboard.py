@@ -15,11 +15,12 @@ from typing import Any
 
 from results_rows import Row, Rows, origin, read, select
 
+from swarm_mj.api.policy_facts import facts_of
 from swarm_mj.cli import main as swarm_mj
-from swarm_mj.cli.policies import facts_of
 from swarm_mj.cli.study import read_study
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Mission, paper
+from swarm_mj.policies.about import Information
 from swarm_mj.policies.registry import POLICIES, flown_name, make_policy
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.packages import asset
@@ -44,7 +45,6 @@ M and P, larger packets carry more, and a centre knows the truth.
 
 """
 BASELINE = "tdma"
-SENSING = "carrier sensing"
 SHARE = 0.99  # of missions complete; where a policy has fewer, its cell says so
 
 # What is beside a policy, from the least on. Policies are compared within one of these.
@@ -119,7 +119,7 @@ def information_of(policy: str) -> str:
         return CENTRE
     if facts["payload"] != "none":
         return CARRIES
-    return SENSES if SENSING in (facts["beyond_paper"] or ()) else HEARS
+    return SENSES if Information.CARRIER_SENSING.label in (facts["beyond_paper"] or ()) else HEARS
 
 
 def _names(rows: Rows) -> list[str]:

@@ -9,7 +9,6 @@ from swarm_mj.system.reading import read_rows
 ROOT = Path(__file__).resolve().parent.parent
 TRAINED = ROOT / "training" / "reproduce" / "quick" / "tutorial"
 RUNS = {"turns-1": "with turns", "local-1": "without turns"}
-MOST_BYTES = 10_000_000
 
 
 def table(_results: Path, trained: Path = TRAINED) -> str:
@@ -29,7 +28,7 @@ def table(_results: Path, trained: Path = TRAINED) -> str:
 
 def _ages(path: Path, run: str) -> dict[int, tuple[str, str]]:
     """Return a run's minutes and ages [windows] by its team decisions."""
-    rows = [row for _, row in read_rows(path, "learning curves", MOST_BYTES)]
+    rows = [row for _, row in read_rows(path, "learning curves")]
     found = {
         int(float(row["decisions"])): (
             f"{float(row['minutes']):.1f}",
@@ -45,7 +44,7 @@ def _ages(path: Path, run: str) -> dict[int, tuple[str, str]]:
 
 def _origin(path: Path) -> str:
     """Return who made the numbers, and how to make them again."""
-    rows = [row for _, row in read_rows(path, "trainings", MOST_BYTES) if row["training"] in RUNS]
+    rows = [row for _, row in read_rows(path, "trainings") if row["training"] in RUNS]
     held_out = {json.loads(row["settings"])["held_out"] for row in rows}
     commits = {row["commit"] for row in rows}
     if len(held_out) != 1 or len(commits) != 1:

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from swarm_mj.cli.policies import carried, facts_of
+from swarm_mj.api.policy_facts import carried, facts_of
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Task, paper
 from swarm_mj.policies.policy import Policy

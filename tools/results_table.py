@@ -21,8 +21,8 @@ from typing import Any
 
 from results_rows import Row, Rows, origin, read, select
 
+from swarm_mj.api.policy_facts import facts_of
 from swarm_mj.cli import script
-from swarm_mj.cli.policies import facts_of
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import LARGER_PACKETS
 from swarm_mj.mission import paper

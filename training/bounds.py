@@ -23,6 +23,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import shortest_path
 
 from swarm_mj.cli import script
+from swarm_mj.evaluation.published import TRANSMIT_POWER
 from swarm_mj.mission import paper
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.radio.links import Links, air_of, links_between, lone_probabilities
@@ -34,7 +35,7 @@ from swarm_mj.system.packages import commit
 from swarm_mj.system.writing import Output, check_outputs, write_csv
 
 RESULTS = Path(__file__).resolve().parent / "results"
-RANGE_RATIOS = (0.2, 0.25, 0.5, 0.75, 1.0)
+RANGE_RATIOS = TRANSMIT_POWER.xs
 MOST_LINKS = 400  # of teams whose receptions are searched
 SLACK = 1e-9  # of powers, so that rounding in a programme only raises the number of receptions
 SMALL_TEAMS = {  # positions [m]; a packet reaches 250 m

@@ -31,7 +31,6 @@ from swarm_mj.system.reading import read_rows
 ROOT = Path(__file__).resolve().parent.parent
 COURSES = "converging-courses.csv"
 LATE = "converging-late.csv"
-MOST_BYTES = 10_000_000
 SPANS = ((1, 5), (5, 10), (10, 20), (20, 40))  # of windows
 SHOWN_S = 20.0
 LEAST = 1e-4  # of the first variance: what is drawn
@@ -78,7 +77,7 @@ def read_courses(path: Path) -> list[PolicyCourse]:
         ValueError: The file cannot be read.
     """
     by_policy: dict[str, list[dict[str, str]]] = {}
-    for _, row in read_rows(path, "table of courses", MOST_BYTES):
+    for _, row in read_rows(path, "table of courses"):
         by_policy.setdefault(row["policy"], []).append(row)
     found = []
     for policy, rows in by_policy.items():
@@ -178,7 +177,7 @@ def fresh_factor(known: float, num_robots: int, window_s: float) -> float:
 
 def late_table(folder: Path) -> str:
     """Return late rates by policy and team size, beside what the ages make of them, as Markdown."""
-    rows = [row for _, row in read_rows(folder / LATE, "table of late rates", MOST_BYTES)]
+    rows = [row for _, row in read_rows(folder / LATE, "table of late rates")]
     sizes = list(dict.fromkeys(row["num_robots"] for row in rows))
     cells = {(row["policy"], row["num_robots"]): row for row in rows}
     head = ["policy", *(f"{size} robots" for size in sizes)]

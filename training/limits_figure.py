@@ -32,7 +32,6 @@ from swarm_mj.system.fields import setting
 from swarm_mj.system.reading import read_rows
 
 ROOT = Path(__file__).resolve().parent.parent
-MOST_BYTES = 10_000_000
 SEARCHED, PLANNER = "training.ceiling:Annealed", "planner --payload none"
 FIGURE = RESULT_FIGURES["fig4"]
 METHODS = (
@@ -119,7 +118,7 @@ def read_floor(path: Path) -> tuple[Curve, str]:
 
     Raises ValueError if the file cannot be read, or is not of one commit.
     """
-    rows = [row for _, row in read_rows(path, "table of floors", MOST_BYTES)]
+    rows = [row for _, row in read_rows(path, "table of floors")]
     found: dict[float, list[float]] = {}
     for row in rows:
         found.setdefault(float(row["range_ratio"]), []).append(float(row["floor_windows"]))
@@ -230,7 +229,7 @@ def _age(age: _Age) -> str:
 
 def exact_table(folder: Path) -> str:
     """Return floor and optimum of small teams, as Markdown for docs/bounds.md."""
-    teams = [row for _, row in read_rows(folder / "exact.csv", "table of optima", MOST_BYTES)]
+    teams = [row for _, row in read_rows(folder / "exact.csv", "table of optima")]
     head = ["team, a packet reaching 250 m", "floor [windows]", "optimum [windows]"]
     head.append("floor / optimum")
     rows: list[list[str]] = []

@@ -19,7 +19,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from experiments import MOST_BYTES, Experiment, Scale, Settings, read_experiment, typed
 
@@ -57,6 +57,22 @@ class Failed(Exception):  # noqa: N818 - as KeyboardInterrupt
         self.code = code
 
 
+class Tables(NamedTuple):
+    """The files that a figure leaves."""
+
+    flights: Path  # what its flights cost
+    trainings: Path  # a row for each of its policies
+    curves: Path  # of their trainings
+
+
+class PlannedFlights(NamedTuple):
+    """An evaluation of what was trained, which is to be flown."""
+
+    draft: Path  # of its results
+    command: list[str]  # the arguments of `swarm-mj` that make it
+    curves: dict[str, list[str]]  # of the figure, by the policies that are flown
+
+
 @dataclass(frozen=True, kw_only=True)
 class Work:
     """One figure at one scale."""
@@ -82,10 +98,13 @@ class Work:
         return hashlib.sha256(json.dumps(said).encode()).hexdigest()[:12]
 
     @property
-    def tables(self) -> list[Path]:
-        """The files it leaves: what flights cost, the trainings, and their curves."""
-        flights = self.settings.results / self.settings.scale / f"{self.figure}.csv"
-        return [flights, self.kept / "trainings.csv", self.kept / "curves.csv"]
+    def tables(self) -> Tables:
+        """The files it leaves."""
+        return Tables(
+            flights=self.settings.results / self.settings.scale / f"{self.figure}.csv",
+            trainings=self.kept / "trainings.csv",
+            curves=self.kept / "curves.csv",
+        )
 
     @property
     def kept(self) -> Path:
@@ -95,16 +114,17 @@ class Work:
     @property
     def is_trained(self) -> bool:
         """True if the policies of this very experiment are there, and the tables of them."""
-        paths = [*self.tables[1:], *map(self.policy, self.experiment.trainings)]
+        its = self.tables
+        paths = [its.trainings, its.curves, *map(self.policy, self.experiment.trainings)]
         if not all(path.exists() for path in paths):
             return False
-        rows = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
+        rows = read_rows(self.tables.trainings, "table of trainings")
         return {row.get("experiment") for _, row in rows} == {self.digest}
 
     @property
     def is_flown(self) -> bool:
         """True if the flights' results are there, of this commit."""
-        return _is_current(self.tables[0])
+        return _is_current(self.tables.flights)
 
     def policy(self, name: str) -> Path:
         """Return where the policy of a training is kept."""
@@ -119,13 +139,14 @@ class Work:
         }
 
     @cached_property
-    def flights(self) -> list[tuple[Path, list[str], dict[str, list[str]]]]:
-        """Each draft, the arguments of `swarm-mj` that make it, and the curves of each policy."""
-        return [
-            (draft, self._evaluate(missions, curves, draft), curves)
-            for number, (missions, curves) in enumerate(self.experiment.flights.items())
-            for draft in [self.folder / f"flights-{number}.csv"]
-        ]
+    def flights(self) -> list[PlannedFlights]:
+        """The evaluations that fly what was trained."""
+        planned: list[PlannedFlights] = []
+        for number, (missions, curves) in enumerate(self.experiment.flights.items()):
+            draft = self.folder / f"flights-{number}.csv"
+            command = self._evaluate(missions, curves, draft)
+            planned.append(PlannedFlights(draft=draft, command=command, curves=curves))
+        return planned
 
     def _options(self, name: str) -> list[str]:
         """Return a training's options: the scale's, its own, and its own at this scale."""
@@ -182,13 +203,13 @@ class Work:
                 _say(f"{self.figure}: training {number} of {len(self.trainings)}, {name}")
                 self._train(name, command)
             self._keep()
-        for draft, command, _ in self.flights:
-            if not _is_current(draft):
-                draft.unlink(missing_ok=True)
-                _run(command)
-        write_results(self.tables[0], list(self._results()))
-        for draft, _, _ in self.flights:
-            draft.unlink()
+        for planned in self.flights:
+            if not _is_current(planned.draft):
+                planned.draft.unlink(missing_ok=True)
+                _run(planned.command)
+        write_results(self.tables.flights, list(self._results()))
+        for planned in self.flights:
+            planned.draft.unlink()
 
     def _train(self, name: str, command: list[str]) -> None:
         """Train one, or resume it; leave one alone that came to its end."""
@@ -199,18 +220,18 @@ class Work:
 
     def _keep(self) -> None:
         """Keep the policies, and write the tables of trainings, which say whose they are, last."""
-        _, trainings, curves = self.tables
         rows = {name: _rows(self.folder / name / CURVE) for name in self.trainings}
         table = [{"training": name} | row for name, its in rows.items() for row in its]
         writing.write_csv(
-            curves,
+            self.tables.curves,
             CURVE_COLUMNS,
             ({name: row.get(name) for name in CURVE_COLUMNS} for row in table),
         )
         for name in self.trainings:
             trained = read_file(self.folder / name / POLICY, "policy", MOST_BYTES)
             writing.write_bytes(self.policy(name), trained)
-        writing.write_csv(trainings, TRAINING_COLUMNS, map(self._training, rows, rows.values()))
+        its = map(self._training, rows, rows.values())
+        writing.write_csv(self.tables.trainings, TRAINING_COLUMNS, its)
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
         """Return a row of the table of trainings."""
@@ -228,11 +249,12 @@ class Work:
 
     def _results(self) -> Iterator[Result]:
         """Return the flights' results under their curves' names, with what was trained."""
-        trained = read_rows(self.tables[1], "table of trainings", MOST_BYTES)
+        trained = read_rows(self.tables.trainings, "table of trainings")
         decisions = {row["training"]: int(row["decisions"]) for _, row in trained}
-        for draft, _, curves in self.flights:
+        for planned in self.flights:
+            curves = planned.curves
             paths = {self._flown(name): name for name in curves}
-            for result in read_results(draft):
+            for result in read_results(planned.draft):
                 name = paths[result.policy]
                 own: dict[str, object] = {"policy": name}  # the folder is this machine's
                 if name in decisions:
@@ -264,7 +286,7 @@ def run(settings: Settings) -> int:
             _remove(work)
     for work in works:
         if work not in left:
-            _say(f"{work.figure}: {work.tables[0]} is there; --force makes it anew")
+            _say(f"{work.figure}: {work.tables.flights} is there; --force makes it anew")
     try:
         for work in left:
             work.do()
@@ -289,7 +311,7 @@ def _remove(work: Work) -> None:
 
 def _rows(path: Path) -> list[dict[str, Any]]:
     """Return a run's learning curve."""
-    rows = read_rows(path, "learning curve", MOST_BYTES)
+    rows = read_rows(path, "learning curve")
     return [{name: float(cell) if cell else None for name, cell in row.items()} for _, row in rows]
 
 

@@ -37,7 +37,6 @@ REWARDS = {
     "variance": "GNN trained on velocity variance",
 }
 COSTS = (AOI, VELOCITY_VARIANCE)
-MOST_BYTES = 10_000_000
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -83,7 +82,7 @@ def read_curves(path: Path) -> list[Trained]:
         ValueError: The file cannot be read, or trainings were evaluated at different times.
     """
     by_training: dict[str, list[dict[str, str]]] = {}
-    for _, row in read_rows(path, "learning curves", MOST_BYTES):
+    for _, row in read_rows(path, "learning curves"):
         by_training.setdefault(row["training"], []).append(row)
     found = []
     for reward in REWARDS:

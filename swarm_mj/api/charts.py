@@ -25,9 +25,10 @@ from swarm_mj.evaluation.results import (
 )
 from swarm_mj.evaluation.table import missions_title
 from swarm_mj.protocol.agreement import AGREED
+from swarm_mj.protocol.costs import CostName
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE, MissionCost
 
-Course = Float[np.ndarray, "T"]
+OneCourse = Float[np.ndarray, "T"]
 
 PANEL_IN = 2.1  # of a cost over time
 ROW_IN = 0.32  # of a policy
@@ -42,11 +43,11 @@ MIN_SHARE = 1e-6  # of the largest velocity variance that is drawn
 
 
 def draw_flight(
-    columns: Mapping[str, Course],
+    columns: Mapping[str, OneCourse],
     title: str,
     policy: str,
     window_s: float,
-    own_cost: tuple[str, str] | None,
+    own_cost: CostName | None,
     agreed_window: int | None = None,
 ) -> Figure:
     """Chart a mission's costs over its windows, the age above the task's own cost.
@@ -203,7 +204,7 @@ def _origin(results: Sequence[Result]) -> str:
     return f"{said}; {style.code(first.version, first.commit)}"
 
 
-def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
+def _draw_age(axes: Axes, columns: Mapping[str, OneCourse], colour: str) -> None:
     """Draw the mean age and the worst pair's, shaded until everyone has heard of everyone."""
     if "aoi_worst" in columns:
         worst = columns["aoi_worst"]
@@ -220,7 +221,9 @@ def _draw_age(axes: Axes, columns: Mapping[str, Course], colour: str) -> None:
     axes.legend(frameon=False, loc="lower right", bbox_to_anchor=(1.0, 1.0), ncols=3)
 
 
-def _draw_agreement(axes: Axes, columns: Mapping[str, Course], agreed_window: int | None) -> None:
+def _draw_agreement(
+    axes: Axes, columns: Mapping[str, OneCourse], agreed_window: int | None
+) -> None:
     """Show a flock's velocity variance on a logarithmic axis, and when the flock had agreed."""
     variance = columns["task_cost"]
     first = float(variance[0])

@@ -20,7 +20,7 @@ if TYPE_CHECKING:  # rerun is slow to import
     from swarm_mj.replay.live import LiveReplay
 
 WHERE = (view.WINDOW, view.WEB)
-ANYHOW = "do without one: leave out --live"
+ANYHOW = "do without one: leave out "  # what was given
 AS_FAST_AS_IT_GOES = "max"
 _kept_open = ExitStack()  # viewers of flights from Python, which stay when `fly` returns
 atexit.register(_kept_open.close)
@@ -52,13 +52,19 @@ speed_option = partial(
 )
 
 
-def check_live(where: str | None, speed: float | None) -> None:
-    """Raise ValueError or ModuleNotFoundError if nothing can be shown so."""
+def check_live(where: str | None, speed: float | None, *, given: str = "--live") -> None:
+    """Raise ValueError or ModuleNotFoundError if nothing can be shown so.
+
+    Args:
+        where: A way to show it; None: it was not asked for.
+        speed: That was asked for; None is none.
+        given: What asked for it, and may be left out.
+    """
     if where is None:
         if speed is not None:
             raise ValueError(f"--speed {speed:g} is of live flights; add --live")
         return
-    need("rerun", "a live replay", ANYHOW)
+    need("rerun", "a live replay", ANYHOW + given)
     view.check_live(where)
 
 
@@ -124,5 +130,5 @@ def viewer_to_keep(where: str | bool, console: Console) -> LiveViewer:
     asked = view.WINDOW if where is True else str(where)
     if asked not in WHERE:
         raise ValueError(f'live must be True or "web", not {where!r}')
-    check_live(asked, None)
+    check_live(asked, None, given=f"live={where!r}")
     return _kept_open.enter_context(open_viewer(asked, console))

@@ -15,6 +15,7 @@ from swarm_mj.api.flight_columns import flight_columns
 from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.api.flight_table import flight_rows, flight_title
 from swarm_mj.mission import Mission
+from swarm_mj.protocol.costs import CostName
 from swarm_mj.protocol.mission_costs import AOI
 from swarm_mj.replay.log import Log
 from swarm_mj.replay.view import DEFAULTS, default_seconds, fitted
@@ -101,10 +102,10 @@ class Run:
         return title + components_in(self.config).title
 
     @property
-    def task_cost(self) -> tuple[str, str] | None:
+    def task_cost(self) -> CostName | None:
         """The name of the task's cost, such as velocity variance, and its unit; None without."""
         cost = self.windows[0].costs.task_cost
-        return None if cost is None else (cost.name, cost.unit)
+        return None if cost is None else CostName(cost.name, cost.unit)
 
     def columns(self) -> dict[str, Float[np.ndarray, "T"]]:
         """Return the flight window by window, column by column.

@@ -21,6 +21,7 @@ from swarm_mj.learning.run_folder import (
     read_curve,
     read_run,
 )
+from swarm_mj.learning.selection import column
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
@@ -165,7 +166,7 @@ def _write_csv(path: Path, runs: Sequence[Learned]) -> None:
         row["aoi_last"] = last.aoi
         row["aoi_last_sem"] = last.aoi_sem
         for policy, age in last.references.items():
-            row[f"aoi_{policy.replace('-', '_')}"] = age  # as in curve.csv
+            row[column(AOI, policy)] = age  # as in curve.csv
         rows.append(row)
     names: dict[str, None] = {}  # in order; not all runs need have the same references
     for row in rows:

@@ -28,7 +28,7 @@ from swarm_mj.system.processes import attempt
 from swarm_mj.system.terminal import num_cores, plain_console
 from swarm_mj.system.writing import check_writable
 
-State = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
+Health = Literal["ok", "absent", "broken"]  # absent: flying does without; broken: nothing flies
 MARKS = {"ok": "ok", "absent": "-", "broken": "BROKEN"}
 PACKAGE = "swarm_mj"
 MAX_LETTERS = 400  # of what a trial complains, cut between words
@@ -48,7 +48,7 @@ class Finding(NamedTuple):
 
     group: str  # the heading it stands under
     name: str
-    state: State
+    state: Health
     found: str = ""
     mend: str = ""  # what to do, if it is not ok
 

@@ -1,6 +1,5 @@
 """`swarm-mj policies`: policies, a line each; of one, what it knows and sends."""
 
-import inspect
 import json
 import shlex
 import sys
@@ -11,27 +10,23 @@ from rich.box import SIMPLE_HEAD
 from rich.console import Console
 from rich.table import Column, Table
 
+from swarm_mj.api.policy_facts import BROADCASTS, REQUEST, carried, facts_of
 from swarm_mj.cli.mission_options import mission_flags, one_mission
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.registry import (
     POLICIES,
     SHIPPED,
-    about_of,
     flown_name,
     is_own_policy,
     make_policy,
 )
-from swarm_mj.protocol.packets import PacketField, times
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, common_setting, setting
 from swarm_mj.system.packages import is_installed, missing
 from swarm_mj.system.terminal import named_values, plain_console, this_command
 
 HEADINGS = {False: "each robot decides by itself", True: "a centre decides"}
-# The forms of a window.
-BROADCASTS = "broadcasts"
-REQUEST = "request"
 WINDOWS = {
     BROADCASTS: "two broadcasts, which nobody answers",
     REQUEST: "a request to a teammate, which answers",
@@ -65,7 +60,7 @@ def run(options: PoliciesOptions) -> int:
         if len(names) < len(flown):
             plain_console(is_error=True).print(missing("torch", f"{SHIPPED} is left out: it"))
     with Console(stderr=True).status("Loading ..."):
-        policies = {name: make_policy(name, mission) for name in names if name is not None}
+        policies = {name: make_policy(name, mission) for name in names}
         facts = [facts_of(name, policy, mission) for name, policy in policies.items()]
     if options.json:
         sys.stdout.write(json.dumps(facts if options.name is None else facts[0], indent=2) + "\n")
@@ -74,46 +69,6 @@ def run(options: PoliciesOptions) -> int:
     else:
         _print_one(facts[0], policies[options.name], mission)
     return DONE
-
-
-def facts_of(name: str, policy: Policy, mission: Mission) -> dict[str, Any]:
-    """Return a policy's description of itself, as `--json` has it."""
-    kind = type(policy)
-    packet = policy.packet(mission)
-    about = policy.about
-    entries = [times(field, packet.num_entries) for field in packet.entry]
-    return {
-        "name": name,
-        "is_centralised": policy.is_centralised,
-        "window": BROADCASTS if policy.window(mission).is_broadcast else REQUEST,
-        "uses": _uses(name, policy, mission),
-        "beyond_paper": None if about is None else [kind.label for kind in about.beyond],
-        "payload": policy.payload,
-        "packet_bytes": packet.num_bytes,
-        "packet_fields": [
-            _field_facts(field) for field in (*packet.header, *entries, *packet.payload)
-        ],
-        "probability": policy.parameters.get("probability"),
-        "parameters": dict(policy.parameters),
-        "class": f"{kind.__module__}.{kind.__qualname__}",
-        "description": inspect.getdoc(kind) or "",
-    }
-
-
-def _field_facts(field: PacketField) -> dict[str, Any]:
-    """Return what `--json` has of a packet's field; of counts and choices, no step."""
-    facts: dict[str, Any] = {"name": field.name, "bits": field.bits, "count": field.count}
-    if field.unit:
-        facts["step"] = field.step
-        facts["unit"] = field.unit
-    return facts
-
-
-def _uses(name: str, policy: Policy, mission: Mission) -> str:
-    """Return the information that a policy decides by, in a few words; empty if it is unknown."""
-    # Where another policy flies under this name, the name's own words say so.
-    about = policy.about if flown_name(name, mission) == name else about_of(name)
-    return policy.uses if about is None else about.uses
 
 
 def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
@@ -131,12 +86,6 @@ def _print_all(facts: list[dict[str, Any]], mission: Mission) -> None:
         console.print(table, "")
     more = f"What one knows and sends:  {this_command()} policies NAME"
     plain_console().print(f"Packets are those for {_described(mission)}.\n{more}")
-
-
-def carried(policy: Policy) -> str:
-    """Return what packets carry beyond T, M and P, with its meaning if the policy says it."""
-    payload = None if policy.about is None else policy.about.payload
-    return policy.payload if payload is None else f"{payload.name}: {payload.meaning}"
 
 
 def _print_one(each: dict[str, Any], policy: Policy, mission: Mission) -> None:

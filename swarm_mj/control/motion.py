@@ -72,8 +72,8 @@ def controller_of(mission: Mission) -> Controller:
             return RandomWalk(mission)
         case "flocking":
             return Flocking(mission)
-        case unknown:
-            assert_never(unknown)  # a type error here is a task without a controller
+        case _:
+            assert_never(mission.task)  # a type error here is a task without a controller
 
 
 def initial_velocity(mission: Mission, rng: np.random.Generator) -> Float[np.ndarray, "N D"]:

@@ -22,7 +22,7 @@ from swarm_mj.policies.gnn.feature_sets import (
 )
 from swarm_mj.policies.gnn.graphs import Graphs
 from swarm_mj.policies.learned import LearnedPolicy
-from swarm_mj.policies.policy_config import Weights
+from swarm_mj.policies.policy_config import Tensors
 from swarm_mj.system.arguments import check_kind
 
 USUAL_FEATURES = "extended"  # as of `make_batch`
@@ -132,7 +132,7 @@ class Flown(LearnedPolicy):
                 logits[rows] = self._logits_of_mission(self._seen(graphs, rows))
         return logits
 
-    def identity(self) -> tuple[object, Weights]:
+    def identity(self) -> tuple[object, Tensors]:
         """Return what the model is made of and sees, and its weights and averages now."""
         policy = self._model.policy
         weights: dict[str, np.ndarray] = {}

@@ -1,8 +1,10 @@
 """The `VecEnv` of stable-baselines3, whose environments are robots or teams.
 
-Training's own, `learning.graph_vec_env`, differs in what its networks see and where missions end.
+Training's own, `learning.graph_vec_env`, differs in what its networks see, in who chooses the seeds
+and in where missions end.
 """
 
+from abc import abstractmethod
 from collections.abc import Sequence
 from typing import Any
 
@@ -19,7 +21,7 @@ from swarm_mj.protocol.checks import as_array, checked_robots
 AGENTS = ("robot", "team")  # what an environment is
 
 
-class SwarmVecEnv(VecEnv):
+class BatchVecEnv(VecEnv):
     """Missions, each batch of them one swarm; no Python loop runs over robots.
 
     Environments run batch by batch, mission by mission and, if a robot is one, robot by robot.
@@ -42,24 +44,6 @@ class SwarmVecEnv(VecEnv):
         ends = np.cumsum(sizes).tolist()
         self._envs = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         super().__init__(sum(sizes), observation_space, action_space)
-        self.seed(None)
-
-    def seed(self, seed: int | None = None) -> Sequence[int | None]:
-        """Let the next reset begin the missions of seeds from this one on; return each one's."""
-        missions: list[MissionBatch] = []  # the batch of each mission
-        for batch in self.batches:
-            missions += [batch] * batch.num_missions
-        self._given = seeds_from(seed, len(missions))
-        self._rngs = [seeding.np_random(each)[0] for each in self._given]
-        per_mission = [self._per_mission(batch) for batch in missions]
-        return np.repeat(np.array(self._given, dtype=object), per_mission).tolist()
-
-    def reset(self) -> Observation:
-        """Begin the missions of the seeds given, and else others; their seeds are in infos."""
-        for n in range(len(self.batches)):
-            self._begin(n)
-        self.reset_infos = self._infos()
-        return self._observe()
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions; `step_wait` plays them."""
@@ -88,18 +72,12 @@ class SwarmVecEnv(VecEnv):
             self.reset_infos = self._infos()
         return seen, reward, done, infos
 
-    def action_masks(self) -> Bool[np.ndarray, "E A"]:
-        """Actions that may help: a recipient each, or a team's, robot by robot."""
-        return self._observe()["action_mask"].reshape(self.num_envs, -1).astype(np.bool_)
-
     def env_method(
         self, method_name: str, *_: object, indices: VecEnvIndices = None, **__: object
     ) -> list[Any]:
-        """Call `action_masks`, the one method of environments; raises AttributeError for others."""
-        if method_name != "action_masks":
-            raise AttributeError(f"no environment has its own {method_name}")
-        masks = self.action_masks()
-        return [masks[env] for env in self._get_indices(indices)]
+        """Raise AttributeError: environments have no methods of their own."""
+        del indices
+        raise AttributeError(f"no environment has its own {method_name}")
 
     def get_attr(self, attr_name: str, indices: VecEnvIndices = None) -> list[Any]:
         """Return the attribute of this object, once per environment."""
@@ -130,7 +108,8 @@ class SwarmVecEnv(VecEnv):
             recipients.append(checked_robots("action", rows, batch.shape))
         return recipients
 
-    # Training's environment differs in the following.
+    def _per_mission(self, batch: MissionBatch) -> int:
+        return batch.mission.num_robots if self.agent == "robot" else 1
 
     def _fly(
         self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
@@ -138,6 +117,70 @@ class SwarmVecEnv(VecEnv):
         """Fly one window of a batch, whose environments are these; return the robots' rewards."""
         del envs
         return batch.step(recipient)
+
+    @abstractmethod
+    def _begin(self, n: int) -> None:
+        """Begin other missions of batch n."""
+
+    @abstractmethod
+    def _is_truncated(self) -> Bool[np.ndarray, "E"]:
+        """Return where a mission's end is a cut in time."""
+
+    @abstractmethod
+    def _infos(self) -> list[dict[str, Any]]:
+        """Return what is said of the window flown, by environment."""
+
+    @abstractmethod
+    def _observe(self) -> Observation:
+        """Return what agents see, by environment."""
+
+
+class SwarmVecEnv(BatchVecEnv):
+    """Missions that users train on: they choose the seeds, and all missions are flown to the end.
+
+    Policies may ask for the `action_masks` of sb3-contrib.
+    """
+
+    def __init__(
+        self,
+        batches: Sequence[MissionBatch],
+        agent: str,
+        observation_space: spaces.Space,
+        action_space: spaces.Space,
+    ) -> None:
+        """As of `BatchVecEnv`; the first missions' seeds are drawn."""
+        super().__init__(batches, agent, observation_space, action_space)
+        self.seed(None)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Let the next reset begin the missions of seeds from this one on; return each one's."""
+        missions: list[MissionBatch] = []  # the batch of each mission
+        for batch in self.batches:
+            missions += [batch] * batch.num_missions
+        self._given = seeds_from(seed, len(missions))
+        self._rngs = [seeding.np_random(each)[0] for each in self._given]
+        per_mission = [self._per_mission(batch) for batch in missions]
+        return np.repeat(np.array(self._given, dtype=object), per_mission).tolist()
+
+    def reset(self) -> Observation:
+        """Begin the missions of the seeds given, and else others; their seeds are in infos."""
+        for n in range(len(self.batches)):
+            self._begin(n)
+        self.reset_infos = self._infos()
+        return self._observe()
+
+    def action_masks(self) -> Bool[np.ndarray, "E A"]:
+        """Actions that may help: a recipient each, or a team's, robot by robot."""
+        return self._observe()["action_mask"].reshape(self.num_envs, -1).astype(np.bool_)
+
+    def env_method(
+        self, method_name: str, *_: object, indices: VecEnvIndices = None, **__: object
+    ) -> list[Any]:
+        """Call `action_masks`, the one method of environments; raises AttributeError for others."""
+        if method_name != "action_masks":
+            raise AttributeError(f"no environment has its own {method_name}")
+        masks = self.action_masks()
+        return [masks[env] for env in self._get_indices(indices)]
 
     def _begin(self, n: int) -> None:
         """Begin other missions of batch n: of the seeds given, or else drawn from them."""
@@ -169,6 +212,3 @@ class SwarmVecEnv(VecEnv):
                 rows = rows.reshape(-1, *rows.shape[2:])
             together[name] = rows
         return together
-
-    def _per_mission(self, batch: MissionBatch) -> int:
-        return batch.mission.num_robots if self.agent == "robot" else 1

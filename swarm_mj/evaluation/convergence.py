@@ -286,9 +286,9 @@ def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
     """Return the cost that has to converge, in words; raise ValueError if there is none."""
     its = study.task_cost(mission)
     if goal.below is None:
-        if mission.flocks and (its is None or its[0] == Flocking.cost_name):
+        if mission.flocks and (its is None or its.name == Flocking.cost_name):
             return f"under {AGREED:.0%} of the first velocity variance"
-        what = f"{its[0]} [{its[1]}]" if its else "no cost"
+        what = f"{its.name} [{its.unit}]" if its else "no cost"
         way_out = "say below which number of it" if its else "check flocking, or name a controller"
         raise ValueError(f"this task has {what}, so nothing says when it converged; {way_out}")
     if its is None:
@@ -296,7 +296,8 @@ def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
             f"below {goal.below:g} is of a task's cost, and {mission.task} has none; name a "
             "controller with a cost, or check flocking"
         )
-    name, unit = its
-    if goal.unit not in (None, unit):
-        raise ValueError(f"{name} is in {unit}, not {goal.unit}; give the number in {unit}")
-    return f"{name} below {goal.below:g} {unit}"
+    if goal.unit not in (None, its.unit):
+        raise ValueError(
+            f"{its.name} is in {its.unit}, not {goal.unit}; give the number in {its.unit}"
+        )
+    return f"{its.name} below {goal.below:g} {its.unit}"

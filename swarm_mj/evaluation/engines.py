@@ -32,7 +32,7 @@ Product = TypeVar("Product")  # what was made of a piece
 Work = Callable[[Piece], Product]
 Done = Generator[tuple[int, Product]]  # pieces' indices and products
 Share = Sequence[tuple[int, Piece]]  # a job's pieces, with their indices
-Outcome = list[tuple[int, Product]] | Exception  # a job's products, or what went wrong
+Returned = list[tuple[int, Product]] | Exception  # a job's products, or what went wrong
 
 # Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
 # look for a window system, which it does by a program that complains if it is left.
@@ -205,7 +205,7 @@ class SlurmJob(Protocol[Product]):
         """Return why the job failed, if it did."""
         ...
 
-    def result(self) -> Outcome[Product]:
+    def result(self) -> Returned[Product]:
         """Return what the job brought."""
         ...
 
@@ -235,7 +235,7 @@ def _finished(
 _worker_code = cache(code_digest)  # a worker hashes its code once, not once a piece
 
 
-def _do(work: Work[Piece, Product], code: str, share: Share[Piece]) -> Outcome[Product]:
+def _do(work: Work[Piece, Product], code: str, share: Share[Piece]) -> Returned[Product]:
     """Return pieces' indices and products in another process, or what went wrong."""
     if _worker_code() != code:
         other = f"{socket.gethostname()} has other code, digest {_worker_code():.12}"
@@ -247,7 +247,7 @@ def _do(work: Work[Piece, Product], code: str, share: Share[Piece]) -> Outcome[P
         return error
 
 
-def _unpacked(done: Outcome[Product]) -> list[tuple[int, Product]]:
+def _unpacked(done: Returned[Product]) -> list[tuple[int, Product]]:
     if isinstance(done, Exception):
         raise done
     return done

@@ -16,6 +16,7 @@ from swarm_mj.evaluation.samples import Interval, Sample, quantile_of_counts, sh
 from swarm_mj.evaluation.study import Study
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy import Policy
+from swarm_mj.protocol.costs import CostName
 from swarm_mj.protocol.mission_costs import MissionCost
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 
@@ -57,18 +58,18 @@ class Measurements:
         return self.study.components.names.get(kind)
 
     @cached_property
-    def _task_cost_names(self) -> tuple[str, str] | tuple[None, None]:
-        return self.study.task_cost(self.mission) or (None, None)
+    def _task_cost(self) -> CostName | None:
+        return self.study.task_cost(self.mission)
 
     @property
     def task_cost_name(self) -> str | None:
         """The name of the task's cost, as its controller calls it; None if it has none."""
-        return self._task_cost_names[0]
+        return None if self._task_cost is None else self._task_cost.name
 
     @property
     def task_cost_unit(self) -> str | None:
         """The unit of the task's cost."""
-        return self._task_cost_names[1]
+        return None if self._task_cost is None else self._task_cost.unit
 
     # The costs, a number of each mission.
 

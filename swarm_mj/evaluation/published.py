@@ -28,7 +28,7 @@ from swarm_mj.system.reading import read_rows
 BASELINES = ("random-flooding", "round-robin", "mst")  # the paper's three
 FLOCK = "fig2"  # a mission's start and end, drawn by `flock`; the others are below
 FORMATS = ("svg", "png", "pdf")
-Scale: TypeAlias = Literal["linear", "log"]
+AxisScale: TypeAlias = Literal["linear", "log"]
 MissionField: TypeAlias = Literal["num_robots", "range_ratio", "velocity_ratio"]
 # The fields that figures sweep, by the command line's options.
 OPTIONS: dict[MissionField, str] = {
@@ -69,7 +69,7 @@ class Panel(NamedTuple):
     """One pair of axes: a cost over the figure's x."""
 
     cost: MissionCost
-    scale: Scale = "log"
+    scale: AxisScale = "log"
     # Its mean over a mission in which all robots always know all, if that can be computed.
     perfect: Callable[[Mission], float] | None = None
 
@@ -83,7 +83,7 @@ class ResultFigure:
     task: Task
     x_name: MissionField | Literal["receptive_field"]  # the latter is a policy's own
     x_label: str  # with its unit
-    x_scale: Scale = "linear"
+    x_scale: AxisScale = "linear"
     irrelevant: tuple[MissionField, ...] = ()  # fields that change nothing in this task
     panels: tuple[Panel, ...]
 

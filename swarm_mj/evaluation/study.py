@@ -13,6 +13,7 @@ from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Parameters, Policy
 from swarm_mj.policies.policy_arguments import PolicyArguments
+from swarm_mj.protocol.costs import CostName
 from swarm_mj.simulation.components import Components, digest
 from swarm_mj.system.fields import check, common_setting, setting
 from swarm_mj.system.packages import code_digest, commit, version
@@ -45,16 +46,14 @@ class Study:
         ValueError: There is nothing to evaluate, a policy is unknown, or a number out of range.
     """
 
-    # Names among `POLICIES`, or directories of learned ones.
     policies: tuple[str, ...] = setting(reads=registry.files_of)
     regimes: tuple[Mission, ...]
     episodes: int = common_setting(100, "missions per policy", low=1, high=10**5)
     seed: int = common_setting(1000, "seed of the first mission; the others follow one by one")
-    probability: float | None = setting(None, low=0.0, high=1.0)  # None is each policy's own
-    is_deterministic: bool = False  # whether learned policies take the most probable recipient
-    # Users' own extractors that learned policies may load.
+    probability: float | None = setting(None, low=0.0, high=1.0)
+    is_deterministic: bool = False
     features: tuple[str, ...] = setting((), reads=files_named)
-    networks: tuple[str, ...] = setting((), reads=files_named)  # likewise
+    networks: tuple[str, ...] = setting((), reads=files_named)
     components: Components = setting(Components(), former=("parts",))
     baseline: str | None = common_setting(
         None,
@@ -166,12 +165,12 @@ class Study:
             networks=self.networks,
         )
 
-    def task_cost(self, regime: Mission) -> tuple[str, str] | None:
+    def task_cost(self, regime: Mission) -> CostName | None:
         """Return the name and the unit of a regime's task cost; None if its controller has none."""
         controller = self.components.made(regime).controller or controller_of(regime)
         if not isinstance(controller, Costed):
             return None
-        return controller.cost_name, controller.cost_unit
+        return CostName(controller.cost_name, controller.cost_unit)
 
     def config(self, policy: str, regime: Mission) -> dict[str, Any]:
         """All that a policy's missions in a regime depend on, but for their seeds."""

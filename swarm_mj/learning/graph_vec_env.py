@@ -14,7 +14,7 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvStepReturn
 
 from swarm_mj.envs.credit import ReplayedWindow
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next
-from swarm_mj.envs.vec_env import SwarmVecEnv
+from swarm_mj.envs.vec_env import BatchVecEnv
 from swarm_mj.learning.credit_scale import CreditScale
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.graphs import Graphs
@@ -32,7 +32,7 @@ class RowCredits(NamedTuple):
     is_whole: Bool[np.ndarray, "S E"]  # whether all of the horizon was flown, or the mission ended
 
 
-class GraphVecEnv(SwarmVecEnv):
+class GraphVecEnv(BatchVecEnv):
     """Environments for PPO over the Aggregation GNN, per robot or per team by its credit.
 
     Per robot, the reward is the robot's credit, over the number of pairs, and then by what credits
@@ -104,6 +104,11 @@ class GraphVecEnv(SwarmVecEnv):
     def num_teams(self) -> int:
         """Missions, and so team decisions a window."""
         return sum(batch.num_missions for batch in self.batches)
+
+    def seed(self, seed: int | None = None) -> Sequence[int | None]:
+        """Change nothing: the training's own generator draws the missions' seeds."""
+        del seed
+        return [None] * self.num_envs
 
     def reset(self) -> Observation:
         """Start the missions under way over; others would shift the seeds of all that follow."""

@@ -49,7 +49,7 @@ from swarm_mj.replay.recorder import Recorder
 from swarm_mj.simulation.rollout import WindowRecord, rollout
 from swarm_mj.simulation.swarm import Swarm
 
-Flown = list[BatchCosts]  # by kind of mission
+CostsByKind = list[BatchCosts]  # by kind of mission
 Samples = list[Float[np.ndarray, "B"]]  # by kind of mission
 Acting = Network | Weights  # what is trained, and decides
 MakePolicy = Callable[[Mission], Policy]
@@ -65,9 +65,9 @@ class Flights:
     total: int = 1  # flights, at most
     num_windows: int = 0  # flown
 
-    def fly(self, policy_of: MakePolicy, first_seed: int, num_missions: int) -> Flown:
+    def fly(self, policy_of: MakePolicy, first_seed: int, num_missions: int) -> CostsByKind:
         """Fly as many missions of each kind, from a seed on; return their costs."""
-        flown: Flown = []
+        flown: CostsByKind = []
         for mission in self.training.kinds:
             seeds = range(first_seed, first_seed + num_missions)
             swarm = Swarm(mission, seeds, **self.training.components.given)
@@ -237,7 +237,7 @@ def record_replay(training: Training, acting: Acting, decisions: int, folder: Pa
     write_replay(recorder.log(about), about, folder / f"decisions-{decisions:09d}.rrd")
 
 
-def _means(training: Training, costs: Flown) -> HeldOutCosts:
+def _means(training: Training, costs: CostsByKind) -> HeldOutCosts:
     age = _samples(costs, AOI)
     variance = _samples(costs, VELOCITY_VARIANCE)
     if training.cost is AOI:
@@ -262,7 +262,7 @@ def _means(training: Training, costs: Flown) -> HeldOutCosts:
     )
 
 
-def _samples(costs: Flown, cost: MissionCost) -> Samples:
+def _samples(costs: CostsByKind, cost: MissionCost) -> Samples:
     """Return each mission's cost, by kind of mission."""
     return [each.of(cost) for each in costs]
 

@@ -1,5 +1,6 @@
 """Stable-baselines3's PPO with the run's numbers (III-C), its networks and its rollout buffer."""
 
+import math
 import warnings
 from collections.abc import Callable, Generator
 from dataclasses import replace
@@ -130,11 +131,12 @@ def _batch_size(training: Training, num_envs: int) -> int:
     num_rows = num_envs * training.ppo.num_steps
     num_minibatches = training.ppo.num_minibatches
     if num_rows < 2 * num_minibatches:
+        needed = math.ceil(2 * num_minibatches * training.missions / num_rows)
         raise ValueError(
             f"a rollout of {num_rows} rows is too small for {num_minibatches} minibatches; train "
-            f"on {-(-2 * num_minibatches // training.ppo.num_steps)} or more missions"
+            f"on {needed} or more missions"
         )
-    return -(-num_rows // num_minibatches)
+    return math.ceil(num_rows / num_minibatches)
 
 
 def decayed_rate(ppo: PpoSettings, num_epochs: int) -> float:

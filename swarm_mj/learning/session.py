@@ -260,9 +260,7 @@ class Session(ABC):
             self._kept[decisions],
             {
                 "training": asdict(training) | made,
-                "evaluation": {"aoi_sem": costs.aoi_sem}
-                | asdict(costs)
-                | held_out.notes_of(training, choice),
+                "evaluation": asdict(costs) | held_out.notes_of(training, choice),
                 "commit": commit(),
                 "version": version(),
             },

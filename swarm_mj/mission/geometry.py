@@ -11,6 +11,7 @@ from swarm_mj.system.compiled import compiled
 ROOT = -1  # the parent of the root
 PLANE = 2  # axes of a team whose robots are all at one height
 SPACE = 3  # axes of a team whose robots have a height
+HEIGHT = 2  # the axis of heights
 
 
 @compiled()
@@ -20,7 +21,7 @@ def squared_distance(position_m: Float[np.ndarray, "N D"], i: int, j: int) -> fl
     dy = position_m[i, 1] - position_m[j, 1]
     squared_m2 = dx * dx + dy * dy
     if position_m.shape[1] > PLANE:
-        dz = position_m[i, 2] - position_m[j, 2]
+        dz = position_m[i, HEIGHT] - position_m[j, HEIGHT]
         squared_m2 += dz * dz
     return squared_m2
 

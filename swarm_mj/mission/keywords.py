@@ -12,7 +12,7 @@ from swarm_mj.mission.faults import FaultsFields
 from swarm_mj.mission.impairments import ImpairmentsFields
 from swarm_mj.mission.knowledge import KnowledgeFields
 from swarm_mj.mission.surroundings import SurroundingsFields
-from swarm_mj.mission.team import Task, TeamFields
+from swarm_mj.mission.team import Preset, Task, TeamFields
 from swarm_mj.mission.transceiver import TransceiverFields
 
 
@@ -38,7 +38,7 @@ class MissionFields(
 class PresetAndFields(MissionFields, total=False):
     """Keywords of functions that take the task by a parameter."""
 
-    preset: str
+    preset: Preset
 
 
 class TaskAndFields(MissionFields, total=False):

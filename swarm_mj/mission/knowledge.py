@@ -9,7 +9,7 @@ from swarm_mj.system.fields import set_to, setting
 Grant = Literal["map", "statistics", "start"]  # what robots may know before the mission
 Knowable = Literal["nothing", Grant]
 
-NOTHING = "nothing"  # is known beforehand, beyond free space
+NOTHING: Knowable = "nothing"  # is known beforehand, beyond free space
 
 
 def in_order(prior_knowledge: str) -> str:
@@ -59,7 +59,7 @@ class Knowledge:
         group=CHANNEL,
     )
 
-    def grants(self, what: str) -> bool:
+    def grants(self, what: Knowable) -> bool:
         """Return whether robots know this before the mission."""
         return what in self.prior_knowledge.split(",")
 

@@ -10,7 +10,7 @@ from functools import partial
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.mission.geometry import PLANE, SPACE, gather_connected
+from swarm_mj.mission.geometry import HEIGHT, PLANE, SPACE, gather_connected
 from swarm_mj.mission.specification import Mission
 from swarm_mj.system.compiled import compiled
 
@@ -58,18 +58,26 @@ def connected_positions(
 ) -> Float[np.ndarray, "N D"]:
     """Return positions uniform in the area at which the team is connected [m] (IV-B).
 
-    Positions lie within plus or minus `half_side_m`. By default the disk graph must be connected;
-    `largest_part_at` says who is in the largest connected part under the team's own channel. Robots
-    that `is_blocked_at` names cannot be there and are drawn anew. With `keeps_largest`, and where
-    the largest part is known, only robots outside it are drawn anew, not the whole team: between
-    obstacles, or of thousands, hardly any team is connected that is drawn at once. Robots with a
-    `height_m` are there [m], and have three axes. Raises
-    ValueError if all draws were disconnected, or the area has hardly any free space.
+    Args:
+        num_robots: N.
+        half_side_m: Positions lie within plus or minus this, along x and y [m].
+        range_m: Of the disk graph, which must be connected [m].
+        rng: Draws the positions.
+        largest_part_at: Says who is in the largest connected part under the team's own channel;
+            None is the disk graph's.
+        is_blocked_at: Says who cannot be there, and is drawn anew; None: all can.
+        keeps_largest: Whether only robots outside the largest part are drawn anew, not the whole
+            team: between obstacles, or of thousands, hardly any team is connected that is drawn at
+            once.
+        height_m: Of each robot, [N], [m]; then positions have three axes.
+
+    Raises:
+        ValueError: All draws were disconnected, or the area has hardly any free space.
     """
     num_draws = min(MAX_DRAWS, MAX_ROBOTS_DRAWN // num_robots)
     position_m = np.empty((num_robots, PLANE if height_m is None else SPACE))
     if height_m is not None:
-        position_m[:, PLANE] = height_m
+        position_m[:, HEIGHT] = height_m
     is_kept = np.zeros(num_robots, dtype=np.bool_)
     find = largest_part_at or partial(largest_part, range_m=range_m)
     for _ in range(num_draws):
@@ -77,7 +85,8 @@ def connected_positions(
         part = find(position_m)
         if np.all(part):
             return position_m
-        is_kept = part & keeps_largest
+        if keeps_largest:
+            is_kept = part
     reach = f"a range of {range_m:g} m"
     if largest_part_at is not None:
         reach += " in free space, which this channel changes,"

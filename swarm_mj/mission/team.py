@@ -21,7 +21,7 @@ class Team:
     """The task, the team and its area, how robots move, and time."""
 
     # What is flown.
-    preset: str = setting(
+    preset: Preset = setting(
         "paper",
         "the paper's text or code, or an arena with its channel",
         label="preset",

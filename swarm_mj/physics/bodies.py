@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from mujoco import batch
-from mujoco._enums import mjtBias, mjtDyn
+from mujoco._enums import mjtDyn
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
@@ -32,6 +32,7 @@ from swarm_mj.physics.robots import (
     OwnPilot,
     RobotKind,
     collides,
+    is_motor,
     kinds_of,
     make_pilots,
     sensor_limits,
@@ -60,7 +61,7 @@ class _Flown(NamedTuple):
     qpos: Float[np.ndarray, "B n Q"]
     qvel: Float[np.ndarray, "B n V"]
     ctrl: Float[np.ndarray, "B n U"]
-    push: Float[np.ndarray, "B n V"]  # forces of contacts
+    contact_n: Float[np.ndarray, "B n V"]  # forces of contacts; about axes, Nm
     sensors: Float[np.ndarray, "B n S"]
     force_n: Float[np.ndarray, "B n U"]  # of motors; of those that turn, Nm
     speed_mps: Float[np.ndarray, "B n U"]  # of what they move; of what turns, rad/s
@@ -68,7 +69,7 @@ class _Flown(NamedTuple):
     has_crashed: Bool[np.ndarray, "B n"]
     energy_j: Float[np.ndarray, "B n"]
     motors: Motors | None  # None: the model does not say what they use
-    pushes: Float[np.ndarray, "U 3"]  # of each motor's force on the robot, by its weight [1/N]
+    thrust_per_n: Float[np.ndarray, "U 3"]  # of each motor's force, by the robot's weight [1/N]
     is_trusted: bool  # the pilot is the package's own
     free: Sensed | None  # views of a free base's states; None: its base is on a plane
 
@@ -158,7 +159,7 @@ class BodyWorlds:
                 qpos=qpos,
                 qvel=qvel,
                 ctrl=part("ctrl", kind, model.nu),
-                push=part("qfrc_constraint", kind, model.nv),
+                contact_n=part("qfrc_constraint", kind, model.nv),
                 sensors=sensors,
                 force_n=part("actuator_force", kind, model.nu),
                 speed_mps=part("actuator_velocity", kind, model.nu),
@@ -171,7 +172,7 @@ class BodyWorlds:
                 motors=motors_of(
                     np.linalg.norm(pushes, axis=1), kind.declared, self._step_s, AIR_DENSITY
                 ),
-                pushes=pushes / (kind.mass_kg * GRAVITY_MPS2),
+                thrust_per_n=pushes / (kind.mass_kg * GRAVITY_MPS2),
                 is_trusted=is_ours(pilot),
                 free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )
@@ -228,9 +229,9 @@ class BodyWorlds:
         bodies = slice(1, 1 + len(of_body))
         mass_kg[:, bodies] = model.body_mass[bodies] * heavier[:, of_body]
         inertia_kgm2[:, bodies] = model.body_inertia[bodies] * heavier[:, of_body, None]
-        is_motor = model.actuator_biastype == mjtBias.mjBIAS_NONE  # whose gain is its force
-        own_gain = model.actuator_gainprm[is_motor]
-        gain[:, is_motor] = own_gain * stronger[:, of_actuator[is_motor], None]
+        motors = is_motor(model)  # whose gain is their force
+        own_gain = model.actuator_gainprm[motors]
+        gain[:, motors] = own_gain * stronger[:, of_actuator[motors], None]
         self._batch.set_const()
 
     def _owners(self, numbers: Sequence[int]) -> Int[np.ndarray, "K"]:
@@ -355,7 +356,7 @@ class BodyWorlds:
                         flown.energy_j,
                     )
                 if flown.kind.is_free:
-                    _note_contacts(flown.push, flown.has_crashed)
+                    _note_contacts(flown.contact_n, flown.has_crashed)
                     _slow_tumbling(flown.has_crashed, flown.qvel)
         self._take_states()
         self._change_gusts()
@@ -382,7 +383,7 @@ class BodyWorlds:
         thrust = np.empty((*shape, 3))
         for flown in self._flown:
             sensed = _sensed(flown)
-            thrust[:, flown.robots] = flown.force_n @ flown.pushes
+            thrust[:, flown.robots] = flown.force_n @ flown.thrust_per_n
             if sensors is not None:
                 sensors[:, flown.robots, : sensed.sensors.shape[2]] = sensed.sensors
             position_m[:, flown.robots] = sensed.position_m
@@ -545,11 +546,13 @@ def _hold_places(
 
 
 @compiled(makes_arrays=False)
-def _note_contacts(push: Float[np.ndarray, "B n V"], has_crashed: Bool[np.ndarray, "B n"]) -> None:
+def _note_contacts(
+    contact_n: Float[np.ndarray, "B n V"], has_crashed: Bool[np.ndarray, "B n"]
+) -> None:
     """Note whom contacts push at all: MuJoCo's constraints act on nothing else here."""
-    for b in range(push.shape[0]):
-        for i in range(push.shape[1]):
-            if push[b, i, 0] != 0.0 or push[b, i, 1] != 0.0 or push[b, i, 2] != 0.0:
+    for b in range(contact_n.shape[0]):
+        for i in range(contact_n.shape[1]):
+            if contact_n[b, i, 0] != 0.0 or contact_n[b, i, 1] != 0.0 or contact_n[b, i, 2] != 0.0:
                 has_crashed[b, i] = True
 
 

@@ -115,11 +115,6 @@ class RobotKind:
         return np.repeat(limit, model.sensor_dim)
 
     @property
-    def is_motor(self) -> Bool[np.ndarray, "U"]:
-        """True for actuators whose force is their control times a gain, and nothing else."""
-        return self.model.actuator_biastype == mjtBias.mjBIAS_NONE
-
-    @property
     def pushes(self) -> Float[np.ndarray, "U 3"]:
         """How each motor pushes the base, in its axes, by its force before gears."""
         return self._effects()[:, :3]
@@ -140,7 +135,7 @@ class RobotKind:
         axes = list(range(FREE_QVEL)) if self.is_free else PLANAR_AXES
         effect = np.zeros((model.nu, FREE_QVEL))
         effect[:, axes] = moment[:, : len(axes)]
-        effect[~self.is_motor] = 0.0
+        effect[~is_motor(model)] = 0.0
         return effect
 
     def _inertia_kgm2(self) -> Float[np.ndarray, "3"]:
@@ -174,6 +169,11 @@ def collides(model: MjModel) -> Bool[np.ndarray, "G"]:
     """Return which geoms are of the robot, not its surroundings, and collide."""
     has_mask = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
     return has_mask & (model.geom_bodyid > 0)
+
+
+def is_motor(model: MjModel) -> Bool[np.ndarray, "U"]:
+    """Return which actuators' force is their control times a gain, and nothing else."""
+    return model.actuator_biastype == mjtBias.mjBIAS_NONE
 
 
 def rest_pose(model: MjModel) -> MjData:

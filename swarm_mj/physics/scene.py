@@ -59,9 +59,8 @@ AIR_VISCOSITY = 1.82e-5  # likewise [Pa s]
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
-# What a scene must leave: of joints, of actuators, and of MuJoCo's options.
-MOVING = (
-    # of joints
+# What a scene must leave, by what it is of.
+OF_JOINTS = (
     "axis",
     "damping",
     "stiffness",
@@ -76,7 +75,10 @@ MOVING = (
     "solimp_limit",
     "actgravcomp",
     "margin",
-    # of actuators
+)
+OF_ACTUATORS = (
+    "damping",
+    "armature",
     "gear",
     "gainprm",
     "biasprm",
@@ -88,7 +90,8 @@ MOVING = (
     "forcerange",
     "ctrllimited",
     "forcelimited",
-    # of MuJoCo's options
+)
+OF_OPTIONS = (
     "integrator",
     "solver",
     "cone",
@@ -312,14 +315,14 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 
 def _motion(spec: MjSpec) -> dict[str, str]:
     """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
+    numbers = [OF_JOINTS] * len(spec.joints) + [OF_ACTUATORS] * len(spec.actuators) + [OF_OPTIONS]
     parts = [*spec.joints, *spec.actuators, spec.option]
     owners = [*_moving_parts(spec), "option"]
     motion: dict[str, str] = {}
-    for owner, part in zip(owners, parts, strict=True):
-        for name in MOVING:
-            value = getattr(part, name, None)
-            if value is not None:
-                motion[f"{name} of {owner}"] = str(np.asarray(value).tolist())  # nan is nan there
+    for owner, part, names in zip(owners, parts, numbers, strict=True):
+        for name in names:
+            value = getattr(part, name)
+            motion[f"{name} of {owner}"] = str(np.asarray(value).tolist())  # nan is nan there
     return motion
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float, Int
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.policy import DecentralisedPolicy, Parameters
-from swarm_mj.policies.policy_config import MlpShape, Weights
+from swarm_mj.policies.policy_config import MlpShape, Tensors
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.system.compiled import compiled
 
@@ -100,7 +100,7 @@ class MlpPolicy(LearnedPolicy):
     def __init__(
         self,
         shape: MlpShape,
-        weights: Weights,
+        weights: Tensors,
         extractor: FeatureExtractor,
         *,
         is_deterministic: bool = False,
@@ -132,6 +132,6 @@ class MlpPolicy(LearnedPolicy):
         logits = values.astype(np.float64).reshape(-1, num_robots)
         return np.where(graphs.may_address, logits, IMPOSSIBLE) if shape.obeys_mask else logits
 
-    def identity(self) -> tuple[object, Weights]:
+    def identity(self) -> tuple[object, Tensors]:
         """Return the shape and the weights."""
         return self._shape, self._weights

@@ -280,7 +280,7 @@ class TeamView(NamedTuple):
 def team_views(views: LocalViews) -> list[TeamView]:
     """Return the views mission by mission, for policies that remember each on its own."""
     buffers = views.buffers
-    heard = views.phases[-1].heard if views.phases else views.silence
+    heard = views.last_heard
     each = []
     for b, now in enumerate(views.now.tolist()):
         view = TeamView(

@@ -15,7 +15,7 @@ from swarm_mj.system.streams import check_printable
 SUFFIX = ".safetensors"  # of a stored policy's file
 Edges = Literal["paper", "reference", "both"]
 Activation = Literal["tanh", "relu"]
-Weights = dict[str, np.ndarray]  # by name
+Tensors = dict[str, np.ndarray]  # by name
 # Of the probability of speech: with the one, any is allowed; with 0, robots could never speak.
 NO_BOUND = 1.0
 LEAST_BOUND = 1e-9
@@ -140,7 +140,7 @@ class IndexConfig(PolicyConfig):
 
     @property
     def tensors(self) -> dict[str, tuple[int, ...]]:
-        """The numbers' shapes by name: those of a row of `Weights`."""
+        """The numbers' shapes by name: those of a row of `index.weights.Weights`."""
         return {name: values.shape[1:] for name, values in START._asdict().items()}
 
 

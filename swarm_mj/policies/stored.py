@@ -29,7 +29,7 @@ from swarm_mj.policies.policy_config import (
     IndexConfig,
     MlpConfig,
     StoredConfig,
-    Weights,
+    Tensors,
     model_card,
 )
 from swarm_mj.system.packages import need
@@ -99,7 +99,7 @@ def save_gnn(path: Path, network: "Network", config: GnnConfig, card: str | None
 
 
 def save_weights(
-    path: Path, weights: Weights, config: StoredConfig, card: str | None = None
+    path: Path, weights: Tensors, config: StoredConfig, card: str | None = None
 ) -> Path:
     """Store a policy's weights by name, as `save_gnn` does; it returns and raises the same."""
     path = path if path.suffix == SUFFIX else Path(f"{path}{SUFFIX}")
@@ -215,7 +215,7 @@ def load_policy(
 
 
 def _load_network(
-    config: GnnConfig, weights: Weights, networks: Sequence[str] | None, path: Path
+    config: GnnConfig, weights: Tensors, networks: Sequence[str] | None, path: Path
 ) -> None:
     """Load a policy's network if it is a user's own; raise ValueError if it may not be, or differs.
 
@@ -249,7 +249,7 @@ def read_policy(path: Path) -> tuple["Network", GnnConfig]:
     return network_of(config.network, weights, config.own_network), config
 
 
-def read_weights(path: Path) -> tuple[Weights, StoredConfig]:
+def read_weights(path: Path) -> tuple[Tensors, StoredConfig]:
     """Return a policy's weights, each of them checked, and its config.
 
     Raises ValueError if there is no policy, or it is damaged, foreign, oversized or of a newer
@@ -259,7 +259,7 @@ def read_weights(path: Path) -> tuple[Weights, StoredConfig]:
     return weights, config
 
 
-def _read(path: Path) -> tuple[Weights, StoredConfig, tuple[str, ...]]:
+def _read(path: Path) -> tuple[Tensors, StoredConfig, tuple[str, ...]]:
     """Return a policy's weights, its config and the names of its features."""
     place = find_policy(path)
     with _as_unsound(place):
@@ -305,7 +305,7 @@ def find_policy(path: Path) -> Path:
     )
 
 
-def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
+def _read_tensors(path: Path) -> tuple[Tensors, dict[str, str]]:
     with open_file(path, "policy") as file:  # which refuses pipes; `safe_open` would wait for them
         check_size(f"policy {path}", os.fstat(file.fileno()).st_size, MAX_BYTES)
     try:
@@ -317,7 +317,7 @@ def _read_tensors(path: Path) -> tuple[Weights, dict[str, str]]:
         raise ValueError(f"it is damaged, or no safetensors file ({error})") from error
 
 
-def _check_weights(config: StoredConfig, weights: Weights) -> None:
+def _check_weights(config: StoredConfig, weights: Tensors) -> None:
     """Raise ValueError unless weights are a config's, as far as is known without running code."""
     if isinstance(config, GnnConfig) and config.own_network:
         # Their shapes only the code of its user knows.
@@ -329,7 +329,7 @@ def _check_weights(config: StoredConfig, weights: Weights) -> None:
         _check_tensors(config.network.tensors, weights)
 
 
-def _check_tensors(shapes: dict[str, tuple[int, ...]], tensors: Weights) -> None:
+def _check_tensors(shapes: dict[str, tuple[int, ...]], tensors: Tensors) -> None:
     """Raise ValueError unless these are a network's tensors, single-precision and finite."""
     for name in sorted(shapes.keys() ^ tensors.keys()):
         known = "lacks the" if name in shapes else "has an unknown"

@@ -173,7 +173,7 @@ class SpatialTdma(Tdma):
             powers=self._powers,
         )
         if self._contends:
-            heard = views.phases[-1].heard if views.phases else views.silence
+            heard = views.last_heard
             priority_draw, rarity_draw = self._draws.next().swapaxes(0, 1)
             wins = winners(
                 timestamp=buffers.timestamp,
@@ -268,17 +268,17 @@ def winners(
             num_near = 1  # robots in reach that i knows, itself too
             best = -np.inf  # the highest priority of the others in reach
             for k in range(heard.shape[1]):
-                silence = timestamp[b, i, i] - timestamp[b, i, k]
+                age = timestamp[b, i, i] - timestamp[b, i, k]
                 has_sent = k != i and rise[k] > 0.0
                 # What k knows of itself grows newer all the time.
-                news[b, i, k] = silence if has_sent else news[b, i, k] + rise[i]
+                news[b, i, k] = age if has_sent else news[b, i, k] + rise[i]
                 from_sender_m2 = squared_distance(believed_m[b, i], sender, k)
                 if k != sender and (k == i or from_sender_m2 <= range_m**2):
                     news[b, i, k] += learned
                 # The weight w is the cube of the news, so that who has much of it mostly wins.
                 priority[k] = math.log(priority_draw[b, k]) / (news[b, i, k] + SLOT_WINDOWS) ** 3
                 # Who was silent for a round of turns has failed, or is elsewhere.
-                is_heard = timestamp[b, i, k] > NEVER and silence < len(priority) * SLOT_WINDOWS
+                is_heard = timestamp[b, i, k] > NEVER and age < len(priority) * SLOT_WINDOWS
                 is_known = k != i and is_heard
                 apart_m2 = squared_distance(believed_m[b, i], i, k)
                 if is_known and apart_m2 <= (CONTENTION_RANGES * range_m) ** 2:

@@ -74,6 +74,13 @@ def mean_hops(
     return hops
 
 
+class CostName(NamedTuple):
+    """The name of a task's cost, and its unit."""
+
+    name: str
+    unit: str
+
+
 @dataclass(frozen=True, kw_only=True)
 class TaskCost:
     """The cost of the robots' task, as their controller measures it."""

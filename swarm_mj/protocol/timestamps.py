@@ -9,12 +9,13 @@ from jaxtyping import Float, Int
 from swarm_mj.mission.team import SLOTS_PER_WINDOW
 from swarm_mj.system.compiled import compiled
 
-SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW  # Delta t: what a slot lasts [windows]
+# Delta t of Alg. 1: what a slot lasts [windows]. In IV-A the paper means a window by it.
+SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW
 
 
-def slot_of(now: Float[np.ndarray, "B"]) -> Int[np.ndarray, "B"]:
-    """Return the slot that begins now, counted from 0 at the mission's start."""
-    return np.rint(now / SLOT_WINDOWS).astype(np.int64)
+def slot_of(t: Float[np.ndarray, "*S"]) -> Int[np.ndarray, "*S"]:
+    """Return the slot that begins at t [windows], counted from 0 at the mission's start."""
+    return np.rint(t / SLOT_WINDOWS).astype(np.int64)
 
 
 # The rule of the merge stands here, as a condition and as the rise that follows from it. The loops

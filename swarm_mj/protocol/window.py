@@ -22,7 +22,7 @@ from swarm_mj.physics.state import RobotStates
 from swarm_mj.protocol.buffers import Buffers, merge, observe_self, record_attempt
 from swarm_mj.protocol.checks import checked_decode
 from swarm_mj.protocol.partial_buffers import entries_sent
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, slot_of
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
@@ -71,6 +71,16 @@ class LocalViews:
     def silence(self) -> Int[np.ndarray, "B N"]:
         """The recipients that mean silence: everyone addresses itself."""
         return _oneself(self.buffers.shape)
+
+    @property
+    def last_recipient(self) -> Int[np.ndarray, "B N"]:
+        """Whom each robot addressed in the last slot; itself: it was silent."""
+        return self.phases[-1].recipient if self.phases else self.silence
+
+    @property
+    def last_heard(self) -> Int[np.ndarray, "B N"]:
+        """Whom each robot decoded in the last slot; itself: nobody."""
+        return self.phases[-1].heard if self.phases else self.silence
 
 
 @cache
@@ -236,5 +246,4 @@ def channel_at(
     # The usual radio is asked for first: to ask for a runtime protocol takes 10 µs.
     if isinstance(channel, FreeSpaceRadio) or not isinstance(channel, VaryingChannel):
         return channel
-    slot = np.rint(t * SLOTS_PER_WINDOW).astype(np.int64) - 1
-    return channel.at(slot, np.arange(len(t)) if mission is None else mission)
+    return channel.at(slot_of(t) - 1, np.arange(len(t)) if mission is None else mission)

@@ -13,9 +13,9 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
 
-from swarm_mj.radio.composed import ComposedChannel, Reception, faded_powers, is_lost
+from swarm_mj.radio.composed import ComposedChannel, faded_powers, is_lost
 from swarm_mj.radio.free_space import Channel
-from swarm_mj.radio.reception import is_received, sinr
+from swarm_mj.radio.reception import Reception, is_received, sinr
 from swarm_mj.system.compiled import compiled
 
 AIRTIME = 0.8  # of a slot; the bytes of a slot are those of all of it (`packets.slot_bytes`)

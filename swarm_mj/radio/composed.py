@@ -5,7 +5,6 @@ mission's key and of the slot, so a slot that is played again is the same slot.
 """
 
 from collections.abc import Sequence
-from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt64
@@ -25,6 +24,7 @@ from swarm_mj.radio.free_space import Channel
 from swarm_mj.radio.power_law import MeanPowers, PowerLaw, compute_powers, no_powers, place_robots
 from swarm_mj.radio.reception import (
     Air,
+    Reception,
     add_to_air,
     decoded,
     incoming_at,
@@ -37,18 +37,6 @@ from swarm_mj.system.compiled import compiled
 _FADES = np.uint64(1)
 _ERASURES = np.uint64(2)
 _BURSTS = np.uint64(3)
-
-
-class Reception(NamedTuple):
-    """The parameters that decide whether a packet of a given mean power decodes."""
-
-    noise_mw: float  # sigma [mW]
-    threshold: float  # least SINR that decodes, linear [1]
-    rician_k: float = NO_FADING  # 0 is Rayleigh; linear [1]
-    erasure: float = 0.0  # probability that a packet is lost on a link, whatever its power [1]
-    burst_begin: float = 0.0  # probability per slot that a receiver loses all (`is_in_burst`)
-    burst_end: float = 1.0  # that it hears again
-    recipient_hears_while_sending: bool = False  # as `FreeSpaceRadio`'s
 
 
 class ComposedChannel:

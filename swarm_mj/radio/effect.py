@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from typing import ClassVar, NamedTuple
 
 from swarm_mj.mission import Mission
-from swarm_mj.radio.composed import Reception
 from swarm_mj.radio.power_law import PowerLaw
+from swarm_mj.radio.reception import Reception
 from swarm_mj.system.fields import as_typed
 
 
@@ -55,6 +55,6 @@ class MissionEffect(Effect):
         """Return the effect that a mission has, or None."""
 
 
-def titled(**numbers: str | float | int) -> str:
-    """Return fields of `Mission` and their values, as a title names them."""
-    return ", ".join(f"{name} {as_typed(value)}" for name, value in numbers.items())
+def titled(mission: Mission, *names: str) -> str:
+    """Return numbers of a mission with their names, as a title has them."""
+    return ", ".join(f"{name} {as_typed(getattr(mission, name))}" for name in names)

@@ -8,12 +8,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import assert_never
 
-import numpy as np
-from jaxtyping import Float
-
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Antennas, Obstacles
-from swarm_mj.radio.composed import Reception
 from swarm_mj.radio.effect import ChannelModel, Effect, MissionEffect, titled
 from swarm_mj.radio.fading import NO_LINE_OF_SIGHT
 from swarm_mj.radio.free_space import FreeSpaceRadio
@@ -22,6 +18,7 @@ from swarm_mj.radio.power_law import (
     free_space_law,
     two_ray_breakpoint_m,
 )
+from swarm_mj.radio.reception import Reception
 from swarm_mj.system.decibels import from_db
 
 
@@ -51,17 +48,13 @@ class PathLoss(
                 return None
             case "log-distance":  # Rappaport 2002, Eq. 4.69
                 return cls(
-                    title=titled(
-                        path_loss=law,
-                        loss_exponent=mission.loss_exponent,
-                        reference_m=mission.reference_m,
-                    ),
+                    title=titled(mission, "path_loss", "loss_exponent", "reference_m"),
                     breakpoint_m=mission.reference_m,
                     exponent=mission.loss_exponent,
                 )
             case "two-ray" if mission.has_bodies:
                 return cls(
-                    title=titled(path_loss=law),
+                    title=titled(mission, "path_loss"),
                     breakpoint_m=two_ray_breakpoint_m(1.0, mission.frequency_hz),
                     exponent=TWO_RAY_EXPONENT,
                     is_by_height=True,
@@ -69,7 +62,7 @@ class PathLoss(
             case "two-ray":
                 height_m = mission.antenna_height_m
                 return cls(
-                    title=titled(path_loss=law, antenna_height_m=height_m),
+                    title=titled(mission, "path_loss", "antenna_height_m"),
                     breakpoint_m=two_ray_breakpoint_m(height_m, mission.frequency_hz),
                     exponent=TWO_RAY_EXPONENT,
                 )
@@ -103,10 +96,7 @@ class Shadowing(MissionEffect, reads=("shadowing_db", "shadowing_distance_m")):
         if mission.shadowing_db == 0.0:
             return None
         return cls(
-            title=titled(
-                shadowing_db=mission.shadowing_db,
-                shadowing_distance_m=mission.shadowing_distance_m,
-            ),
+            title=titled(mission, "shadowing_db", "shadowing_distance_m"),
             std_db=mission.shadowing_db,
             distance_m=mission.shadowing_distance_m,
         )
@@ -134,10 +124,10 @@ class Fading(MissionEffect, reads=("fading", "rician_k")):
             case "none":
                 return None
             case "rayleigh":
-                return cls(title=titled(fading=law), rician_k=NO_LINE_OF_SIGHT)
+                return cls(title=titled(mission, "fading"), rician_k=NO_LINE_OF_SIGHT)
             case "rician":
                 return cls(
-                    title=titled(fading=law, rician_k=mission.rician_k),
+                    title=titled(mission, "fading", "rician_k"),
                     rician_k=mission.rician_k,
                 )
             case _:
@@ -159,7 +149,7 @@ class Erasure(MissionEffect, reads=("erasure",)):
         """Return the erasures, if any packet is lost."""
         if mission.erasure == 0.0:
             return None
-        return cls(title=titled(erasure=mission.erasure), probability=mission.erasure)
+        return cls(title=titled(mission, "erasure"), probability=mission.erasure)
 
     def change(self, model: ChannelModel) -> ChannelModel:
         """Return a channel that loses this share."""
@@ -183,7 +173,7 @@ class Bursts(MissionEffect, reads=("burst_begin", "burst_end")):
         if mission.burst_begin == 0.0:
             return None
         return cls(
-            title=titled(burst_begin=mission.burst_begin, burst_end=mission.burst_end),
+            title=titled(mission, "burst_begin", "burst_end"),
             begin=mission.burst_begin,
             end=mission.burst_end,
         )
@@ -207,22 +197,16 @@ class HighPower(MissionEffect, reads=("high_power_fraction", "high_power_db")):
         if mission.num_high_power == 0:
             return None
         return cls(
-            title=titled(
-                num_high_power=mission.num_high_power, high_power_db=mission.high_power_db
-            ),
+            title=titled(mission, "num_high_power", "high_power_db"),
             num_robots=mission.num_high_power,
             extra_db=mission.high_power_db,
         )
 
     def change(self, model: ChannelModel) -> ChannelModel:
         """Return a channel on which these robots are stronger."""
-        return model._replace(law=model.law._replace(at_1_m=self.added_to(model.law.at_1_m)))
-
-    def added_to(self, power: Float[np.ndarray, "N"]) -> Float[np.ndarray, "N"]:
-        """Return the powers of all robots, in the same unit, with what these have in addition."""
-        power = power.copy()
-        power[: self.num_robots] *= from_db(self.extra_db)
-        return power
+        at_1_m = model.law.at_1_m.copy()
+        at_1_m[: self.num_robots] *= from_db(self.extra_db)
+        return model._replace(law=model.law._replace(at_1_m=at_1_m))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -240,13 +224,13 @@ class Clocks(MissionEffect, reads=("clock_offset_s", "clock_drift_ppm")):
         """Return how clocks differ, if they do."""
         if not mission.clocks_differ:
             return None
-        titles: list[str] = []
+        named: list[str] = []
         if mission.clock_offset_s > 0.0:
-            titles.append(titled(clock_offset_s=mission.clock_offset_s))
+            named.append("clock_offset_s")
         if mission.clock_drift_ppm > 0.0:
-            titles.append(titled(clock_drift_ppm=mission.clock_drift_ppm))
+            named.append("clock_drift_ppm")
         return cls(
-            title=", ".join(titles),
+            title=titled(mission, *named),
             offset=mission.clock_offset_s / mission.slot_s,
             drift=1e-6 * mission.clock_drift_ppm,
         )

@@ -75,7 +75,8 @@ class GainTable(ComposedChannel):
         is_sender: Bool[np.ndarray, "W N"],
     ) -> Float[np.ndarray, "B N N"]:
         """Return the power of sender i at robot j [mW]; of others, anything."""
-        power_mw = super().received_mw(position_m, mission, is_sender).copy()
+        free_mw = super().received_mw(position_m, mission, is_sender)
+        power_mw = free_mw.copy()  # rows of one mission write the same powers, not twice the loss
         for b, place_m, sends in zip(mission, position_m, is_sender, strict=True):
             i, j = np.nonzero(sends[:, np.newaxis] & ~np.eye(len(sends), dtype=np.bool_))
             away_m, pair = self._pairs.query(
@@ -83,7 +84,7 @@ class GainTable(ComposedChannel):
             )
             weight = np.maximum(away_m, MIN_DISTANCE_M) ** -2.0  # Shepard 1968
             beyond_db = np.sum(weight * self._beyond_db[pair], axis=1) / np.sum(weight, axis=1)
-            power_mw[b, i, j] *= from_db(beyond_db)
+            power_mw[b, i, j] = free_mw[b, i, j] * from_db(beyond_db)
         return power_mw
 
 

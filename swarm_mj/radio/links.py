@@ -221,7 +221,7 @@ def listen(
         heard[j] = j
         probability[j] = 0.0
         if listens[j] and j != also:
-            added = j if also == NOBODY else also
+            added = j if also == NOBODY else also  # j adds nothing at itself
             incoming = incoming_with(links, air, added, j)
             if incoming.strongest > 0.0:
                 probability[j] = chance_of_strongest(links, incoming, j)

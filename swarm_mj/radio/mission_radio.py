@@ -14,13 +14,14 @@ from jaxtyping import Bool, Float
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import Antennas, Obstacles
 from swarm_mj.radio.asynchronous import AsynchronousChannel
-from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.effect import Effect
 from swarm_mj.radio.effects import BodyAntennas, Obstruction, effects_of, model_of
 from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel, transmit_power_dbm
 from swarm_mj.radio.links import KNOWN, Curves, Links, decode_curves, doubtful, links_between
 from swarm_mj.radio.power_law import PowerLaw, free_space_law, powers_between
+from swarm_mj.radio.reception import Reception
 from swarm_mj.system.decibels import from_db
 
 

@@ -16,9 +16,9 @@ from swarm_mj.physics.state import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
 from swarm_mj.system.compiled import compiled
 
 Vector = tuple[float, float, float]
-Interval = tuple[float, float]  # of the share of a line's way; empty if it ends before it begins
+Stretch = tuple[float, float]  # of the share of a line's way; empty if it ends before it begins
 
-EMPTY: Interval = (1.0, 0.0)
+EMPTY: Stretch = (1.0, 0.0)
 
 
 @compiled()
@@ -144,7 +144,7 @@ def _turned(vector: Vector, frame: Float[np.ndarray, "3 3"]) -> Vector:
 
 
 @compiled()
-def _within(p: float, v: float, half: float, part: Interval) -> Interval:
+def _within(p: float, v: float, half: float, part: Stretch) -> Stretch:
     """Return the part of an interval of s in which p + s v lies within plus or minus half."""
     if v == 0.0:
         return part if abs(p) <= half else EMPTY
@@ -163,7 +163,7 @@ def _meets_ball(place: Vector, along: Vector, radius: float) -> bool:
 
 
 @compiled()
-def _within_ball(place: Vector, along: Vector, radius: float, part: Interval) -> Interval:
+def _within_ball(place: Vector, along: Vector, radius: float, part: Stretch) -> Stretch:
     """Return the part of an interval of s in which place + s along lies in a ball."""
     x, y, z = place
     u, v, w = along

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.mission.geometry import PLANE, squared_distance
+from swarm_mj.mission.geometry import HEIGHT, PLANE, squared_distance
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, Antennas, Obstacles
 from swarm_mj.radio.fading import Waves, follow_robots, shadow
 from swarm_mj.radio.obstruction import obstruct
@@ -59,9 +59,9 @@ def no_powers(law: PowerLaw, num_missions: int, num_axes: int = PLANE) -> MeanPo
     )
 
 
-def free_space_law(at_1_m: float, num_robots: int, obstacles: Obstacles | None = None) -> PowerLaw:
+def free_space_law(at_1_m: float, num_robots: int) -> PowerLaw:
     """Return the law of a team whose packets all have this power after one metre."""
-    return PowerLaw(np.full(num_robots, at_1_m), obstacles=obstacles)
+    return PowerLaw(np.full(num_robots, at_1_m))
 
 
 def two_ray_breakpoint_m(height_m: float, frequency_hz: float) -> float:
@@ -115,7 +115,7 @@ def places_of(
     if antennas is None:  # then they are not even copied
         return position_m
     placed_m = position_m.copy()
-    placed_m[:, PLANE] += antennas.height_m
+    placed_m[:, HEIGHT] += antennas.height_m
     return placed_m
 
 
@@ -124,8 +124,8 @@ def breakpoint_between(antenna_m: Float[np.ndarray, "N D"], i: int, j: int, law:
     """Return up to where free space holds between two antennas [m]."""
     if not law.is_by_height:
         return law.breakpoint_m
-    first_m = max(antenna_m[i, PLANE], LEAST_ANTENNA_M)
-    other_m = max(antenna_m[j, PLANE], LEAST_ANTENNA_M)
+    first_m = max(antenna_m[i, HEIGHT], LEAST_ANTENNA_M)
+    other_m = max(antenna_m[j, HEIGHT], LEAST_ANTENNA_M)
     return law.breakpoint_m * first_m * other_m
 
 

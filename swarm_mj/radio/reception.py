@@ -10,6 +10,7 @@ from typing import NamedTuple, cast
 import numpy as np
 from jaxtyping import Float, Int
 
+from swarm_mj.radio.fading import NO_FADING
 from swarm_mj.system.compiled import compiled
 
 # In place of a robot's index. A Python integer would be a type of its own to numba, which then
@@ -18,6 +19,18 @@ NOBODY = cast(int, np.int64(-1))
 MIN_DISTANCE_M = 1e-3  # robots closer than this count as this far apart, which keeps gains finite
 LOGISTIC_SLOPE = 1.702  # 1 / (1 + exp(-1.702 z)) is within 0.01 of the normal distribution function
 CERTAIN = 2.5  # standard deviations beyond which a packet decodes for certain, or never
+
+
+class Reception(NamedTuple):
+    """The parameters that decide whether a packet of a given mean power decodes."""
+
+    noise_mw: float  # sigma [mW]
+    threshold: float  # least SINR that decodes, linear [1]
+    rician_k: float = NO_FADING  # 0 is Rayleigh; linear [1]
+    erasure: float = 0.0  # probability that a packet is lost on a link, whatever its power [1]
+    burst_begin: float = 0.0  # probability per slot that a receiver loses all (`is_in_burst`)
+    burst_end: float = 1.0  # that it hears again
+    recipient_hears_while_sending: bool = False  # as `FreeSpaceRadio`'s
 
 
 class Incoming(NamedTuple):

@@ -10,8 +10,8 @@ from jaxtyping import UInt8
 
 from swarm_mj.replay.palette import Colour
 
-Point: TypeAlias = tuple[float, float]
-Strips: TypeAlias = Sequence[Sequence[Point]] | Sequence[np.ndarray] | np.ndarray
+FlatPoint: TypeAlias = tuple[float, float]
+Strips: TypeAlias = Sequence[Sequence[FlatPoint]] | Sequence[np.ndarray] | np.ndarray
 Colours: TypeAlias = UInt8[np.ndarray, "_ 3"]
 
 
@@ -84,7 +84,7 @@ class Arrows(FlatLayer):
     """Arrows in 2-D."""
 
     def look(
-        self, origins: Sequence[Point] | None = None, vectors: Sequence[Point] | None = None
+        self, origins: Sequence[FlatPoint] | None = None, vectors: Sequence[FlatPoint] | None = None
     ) -> rr.Arrows2D:
         """Return the look, and arrows that never change."""
         return rr.Arrows2D.from_fields(
@@ -101,7 +101,9 @@ class Rings(FlatLayer):
     """Circles in 2-D, whose width is that of their line."""
 
     def look(
-        self, centers: Sequence[Point] | None = None, half_sizes: Sequence[Point] | None = None
+        self,
+        centers: Sequence[FlatPoint] | None = None,
+        half_sizes: Sequence[FlatPoint] | None = None,
     ) -> rr.Ellipses2D:
         """Return the look, and circles that never change."""
         return rr.Ellipses2D.from_fields(
@@ -119,7 +121,7 @@ class Points(FlatLayer):
 
     shrinks: bool = True  # in large teams, where robots would cover each other
 
-    def look(self, positions: Sequence[Point] | None = None, scale: float = 1.0) -> rr.Points2D:
+    def look(self, positions: Sequence[FlatPoint] | None = None, scale: float = 1.0) -> rr.Points2D:
         """Return the look, and points that never change; `scale` is of their size."""
         return rr.Points2D.from_fields(
             positions=positions,

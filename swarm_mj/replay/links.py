@@ -9,7 +9,7 @@ from typing import NamedTuple, TypeAlias
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int16, Shaped, UInt8
 
-from swarm_mj.mission.geometry import PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.radio.composed import strong_groups
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.replay import palette
@@ -19,7 +19,7 @@ from swarm_mj.system.decibels import to_db
 
 Phases: TypeAlias = Int[np.ndarray, "T 2 N"]  # a robot for each one in both phases of windows
 Positions: TypeAlias = Float[np.ndarray, "T N D"]  # of all robots in each window [m]
-Points: TypeAlias = Float[np.ndarray, "L D"]  # an end of each packet [m]; of bodies with heights
+Places: TypeAlias = Float[np.ndarray, "L D"]  # an end of each packet [m]; of bodies with heights
 
 SEGMENTS = 6  # straight pieces of an arc
 RISE = 0.22  # of an arc's top, by its span
@@ -53,15 +53,15 @@ LINK = np.dtype(
     ]
 )
 LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
-Lines: TypeAlias = Float[np.ndarray, "_ 2 D"]  # from start to end, on the map or in space [m]
+Segments: TypeAlias = Float[np.ndarray, "_ 2 D"]  # from start to end, on the map or in space [m]
 
 
 class PacketPaths(NamedTuple):
     """L packets with the same fate, sorted by window."""
 
     row: Int[np.ndarray, "L"]  # the window, 0 to T - 1
-    start_m: Points  # where the sender is
-    end_m: Points  # where the receiver is
+    start_m: Places  # where the sender is
+    end_m: Places  # where the receiver is
 
 
 def fates(
@@ -141,7 +141,7 @@ def arcs(
     height_m = base_m + 4.0 * rise * span_m[:, None] * along * (1.0 - along)
     points_m = packets.start_m[:, None] + along[:, None] * way_m[:, None]
     if points_m.shape[2] > PLANE:  # of bodies, which have heights of their own
-        height_m = height_m + points_m[..., PLANE]
+        height_m = height_m + points_m[..., HEIGHT]
     return np.concatenate([points_m[..., :PLANE], height_m[..., None]], axis=2)
 
 
@@ -222,14 +222,14 @@ def by_kind(links: LinkRows) -> dict[LinkKind, LinkRows]:
     return {"unbelieved": links[~is_too_weak], "too_weak": links[is_too_weak]}
 
 
-def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Lines:
+def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Segments:
     """Return where links begin and end, by the robots' positions in a window or each one's [m]."""
     start_m = position_m[row, links["sender"]]
     end_m = position_m[row, links["receiver"]]
     return np.stack([start_m, end_m], axis=1)
 
 
-def divided(lines_m: Lines, pieces: Float[np.ndarray, "P 2"]) -> Lines:
+def divided(lines_m: Segments, pieces: Float[np.ndarray, "P 2"]) -> Segments:
     """Divide lines from start to end into pieces, as many of each [m]."""
     start_m, end_m = np.moveaxis(lines_m, 1, 0)
     way_m = end_m - start_m

@@ -15,7 +15,7 @@ import rerun as rr
 import rerun_bindings as bindings
 
 from swarm_mj.replay import plots
-from swarm_mj.replay.layer_kinds import Point
+from swarm_mj.replay.layer_kinds import FlatPoint
 from swarm_mj.replay.layout import draw_legend
 from swarm_mj.replay.log import Log
 from swarm_mj.replay.read import with_digest
@@ -89,7 +89,7 @@ class LiveReplay:
         self._next_s = 0.0
         self._num_drawn = 0  # windows
         self._out: RerunLog | None = None
-        self._grid: list[list[Point]] = []  # that the viewer shows
+        self._grid: list[list[FlatPoint]] = []  # that the viewer shows
         self._recordings: _Recordings | None = None
 
     def show(self) -> None:

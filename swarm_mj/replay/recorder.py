@@ -9,7 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 
-from swarm_mj.mission.geometry import PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.costs import TaskCost
 from swarm_mj.replay import links
@@ -188,7 +188,7 @@ class Recorder:
         rows.position_m[row] = states.position_m[index, :, :PLANE]
         rows.velocity_mps[row] = states.velocity_mps[index, :, :PLANE]
         if self._body_rows is not None and states.attitude is not None:
-            self._body_rows.height_m[row] = states.position_m[index, :, PLANE]
+            self._body_rows.height_m[row] = states.position_m[index, :, HEIGHT]
             self._body_rows.attitude[row] = states.attitude[index]
             if states.thrust is not None:
                 self._body_rows.thrust[row] = states.thrust[index]
@@ -252,32 +252,22 @@ class Recorder:
             before: The windows before them, a multiple of `piece_windows`.
             until: The last of them, counted from 1.
         """
-        return self._log(config, before, until)
-
-    def log(self, config: Mapping[str, Any] | None = None) -> Log:
-        """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
-        if self._num_rows == 0:
-            raise ValueError("a replay needs at least 1 window flown, not 0")
-        return self._log(config or {}, 0, self._num_rows)
-
-    def _log(self, config: Mapping[str, Any], first: int, after: int) -> Log:
-        """Return the windows from a row on, up to another."""
-        flown = _Rows(*(array[first:after] for array in self._rows))
+        flown = _Rows(*(array[before:until] for array in self._rows))
         facts = self._facts(config)
         place_m = flown.position_m
         bodies: dict[str, np.ndarray] = {}  # of points, `Log` has none of these fields
         if self._body_rows is not None:
-            body_rows = _BodyRows(*(array[first:after] for array in self._body_rows))
+            body_rows = _BodyRows(*(array[before:until] for array in self._body_rows))
             place_m = links.lifted(flown.position_m, body_rows.height_m)
             bodies = body_rows._asdict()
             if not facts.mission.has_wind:
                 del bodies["wind_mps"]
-        lead = slice(max(0, first - LEAD_WINDOWS), first)
-        compared = self._compared(flown.is_on, first)
-        window = np.arange(first + 1, after + 1)
-        matrices = slice(-(-first // self._stride), -(-after // self._stride))
+        lead = slice(max(0, before - LEAD_WINDOWS), before)
+        compared = self._compared(flown.is_on, before)
+        window = np.arange(before + 1, until + 1)
+        matrices = slice(-(-before // self._stride), -(-until // self._stride))
         # An interrupt within `add` leaves one snapshot or cost too many.
-        costs = self._task_costs[first:after]
+        costs = self._task_costs[before:until]
         value = np.array([cost.value[self._index] for cost in costs])
         packets = links.fates(
             flown.recipient,
@@ -303,6 +293,12 @@ class Recorder:
             **bodies,
             **compared._asdict(),
         )
+
+    def log(self, config: Mapping[str, Any] | None = None) -> Log:
+        """Return all that was recorded, `config` for titles; raise ValueError if it is nothing."""
+        if self._num_rows == 0:
+            raise ValueError("a replay needs at least 1 window flown, not 0")
+        return self.piece(config or {}, 0, self._num_rows)
 
     def _facts(self, config: Mapping[str, Any]) -> Facts:
         mission = self._swarm.mission

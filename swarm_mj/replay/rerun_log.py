@@ -15,15 +15,14 @@ from swarm_mj.replay.layer_kinds import (
     Arrows,
     Colours,
     Entity,
+    FlatPoint,
     Lines,
     Lines3D,
-    Point,
     Points,
     Rings,
     Strips,
 )
-from swarm_mj.replay.links import LinkRows, shades
-from swarm_mj.replay.links import Points as Places
+from swarm_mj.replay.links import LinkRows, Places, shades
 from swarm_mj.replay.log import Log
 from swarm_mj.replay.palette import LinkKind
 from swarm_mj.replay.walk import neighbours_together
@@ -132,7 +131,7 @@ class RerunLog:
             per_window = np.bincount(row, minlength=num_windows)
         self.timed(entity, columns.partition(per_window))
 
-    def words(self, entity: Entity, texts: list[str], places: Sequence[Point]) -> None:
+    def words(self, entity: Entity, texts: list[str], places: Sequence[FlatPoint]) -> None:
         """Write texts that never change at places in 2-D, as labels of points that are not seen."""
         points = rr.Points2D.from_fields(
             positions=places, labels=texts, show_labels=True, radii=-0.1, colors=[palette.TEXT]

@@ -13,7 +13,7 @@ import rerun as rr
 from jaxtyping import Float
 
 from swarm_mj.replay import layers, palette
-from swarm_mj.replay.layer_kinds import Point
+from swarm_mj.replay.layer_kinds import FlatPoint
 from swarm_mj.replay.rerun_log import RerunLog
 
 SIZE = (600.0, 330.0)  # of the plot, in units of its own, y down
@@ -136,7 +136,7 @@ def _draw_references(out: RerunLog, names: list[str], levels: list[float]) -> No
     width, _ = SIZE
     places = spread(levels, LINE)
     colours = [palette.LEARNED]
-    strips: list[list[Point]] = []
+    strips: list[list[FlatPoint]] = []
     for number, (level, place) in enumerate(zip(levels, places, strict=True)):
         beside = width + NAMES / 2.0 - LETTER * len(names[number]) / 2.0
         to_name = [(width, level), (width + LEAD, place), (max(width + LEAD, beside), place)]

@@ -70,7 +70,6 @@ class Components:
         reads=_files,
         **OWN,
     )
-
     pilot: Any = setting(
         None,
         "what makes the controls of robots with bodies",
@@ -82,8 +81,9 @@ class Components:
     def __post_init__(self) -> None:
         for kind, component in self.given.items():
             # A channel that varies from slot to slot is asked for each slot's, not called.
+            is_varying = kind == "channel" and isinstance(component, VaryingChannel)
             is_class = kind == "pilot" and isinstance(component, type)  # made for its robots
-            if not isinstance(component, str) and not hasattr(component, "at") and not is_class:
+            if not isinstance(component, str) and not is_varying and not is_class:
                 check_component(kind, component, CALLED_WITH[kind])
 
     @property

@@ -32,7 +32,7 @@ class Localisation:
         self._draws = Stream(rngs, normal, (mission.num_robots, mission.num_axes))
         self._error_m: np.ndarray | None = None
 
-    def observed(self, states: RobotStates) -> RobotStates:
+    def advance(self, states: RobotStates) -> RobotStates:
         """Return the states with what robots observe of their own positions, a window later."""
         error_m = self._std_m * self._draws.next()
         before_m = self._error_m
@@ -42,9 +42,9 @@ class Localisation:
             moves = np.any(states.velocity_mps, axis=2, keepdims=True)
             error_m = np.where(moves, walked_m, before_m)
         self._error_m = error_m
-        return replace(states, observed_m=self.observed_m(states))
+        return replace(states, observed_m=self.own_m(states))
 
-    def observed_m(self, states: RobotStates) -> Float[np.ndarray, "B N D"]:
+    def own_m(self, states: RobotStates) -> Float[np.ndarray, "B N D"]:
         """Return where robots observe themselves to be, with the errors of this moment [m]."""
-        assert self._error_m is not None  # `observed` has drawn them
+        assert self._error_m is not None  # `advance` has drawn them
         return states.position_m + self._error_m

@@ -73,6 +73,13 @@ class Swarm:
         num_threads: Threads of MuJoCo, from 1 to 1024.
 
     Attributes:
+        mission: The numbers that all missions share.
+        scene: The function that edited the MuJoCo model; None: none did.
+        channel: Who decodes whom.
+        belief: The channel as robots believe it to be, before fades.
+        truth: The channel as a centre knows it, before fades.
+        controller: What drives the robots.
+        is_broadcast: Whether the last window's packets were for everyone (IV-C).
         states: Where the robots truly are, [B N D] each, and who is active; D is 3 of bodies.
         buffers: What the robots know; entry `[b, i, j]` is what i knows about j.
         views: The same as robots see it: read only, with the clock and the last packets.
@@ -127,8 +134,9 @@ class Swarm:
         self.truth = radio.truth
         self._sensing = CarrierSensing(mission, radio.truth)
 
-        is_tasks = own.controller is None
-        self.controller: Controller = controller_of(mission) if is_tasks else own.controller
+        self.controller: Controller = (
+            controller_of(mission) if own.controller is None else own.controller
+        )
         self._controller_is_ours = is_ours(self.controller)
         self._costed = costed(self.controller)
         self.restart(seeds)
@@ -179,7 +187,7 @@ class Swarm:
         """Set the clock to the start, when nobody has said anything yet."""
         self.now = np.zeros(self._num_missions)  # t [windows]
         self.phases: tuple[Phase, ...] = ()
-        self.is_broadcast = False  # whether the last window's packets were for everyone (IV-C)
+        self.is_broadcast = False
 
     def _empty_buffers(self) -> None:
         """Let the robots know themselves, and, where that is granted, each other's first states."""
@@ -293,14 +301,14 @@ class Swarm:
         """
         states = self._states_for(self._controller_is_ours)
         if self._noise is not None:
-            states = replace(states, observed_m=self._noise.observed_m(states))
+            states = replace(states, observed_m=self._noise.own_m(states))
         wanted_mps2 = self.controller(self._read_only, states)
         states = self._physics.step(np.asarray(wanted_mps2, dtype=np.float64))
         return self._observed(states)
 
     def _observed(self, states: RobotStates) -> RobotStates:
         """Return the states with what robots observe of themselves, a window after the last."""
-        return states if self._noise is None else self._noise.observed(states)
+        return states if self._noise is None else self._noise.advance(states)
 
     def step(self, policy: Policy | None = None) -> WindowCosts:
         """Fly one window: the policy decides, the robots move, then they talk.

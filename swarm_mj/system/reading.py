@@ -19,9 +19,10 @@ from swarm_mj.system.fields import former_names
 from swarm_mj.system.streams import check_printable
 
 Kind = TypeVar("Kind")
-Row = tuple[int, dict[str, str]]
+TableRow = tuple[int, dict[str, str]]
 
 MAX_LETTERS = 160  # of what msgspec says
+TABLE_BYTES = 10_000_000  # of a table, unless its reader knows better
 # To open a pipe must not wait for who writes it. Windows has no such flags, but one that keeps it
 # from changing line ends.
 OPENED = os.O_RDONLY
@@ -58,7 +59,7 @@ def check_size(what: str, size: int, most_bytes: int) -> None:
         raise ValueError(f"{what} may have up to {most_bytes} bytes, not {size}")
 
 
-def read_rows(path: Path, what: str, most_bytes: int) -> list[Row]:
+def read_rows(path: Path, what: str, most_bytes: int = TABLE_BYTES) -> list[TableRow]:
     """Return a CSV file's rows by column, and the lines they end on; ValueError if it is none."""
     content = read_file(path, what, most_bytes)
     try:

@@ -376,3 +376,13 @@ def test_the_view_after_an_end_is_the_new_missions_start():
 def test_missions_that_cannot_be_shared_out_are_refused(missions, groups):
     with pytest.raises(ValueError, match=f"not {missions}"):
         env_of("robot", (3, 5), missions=missions, groups=groups)
+
+
+def test_seeds_are_the_trainings_own_whatever_is_asked_for():
+    env = env_of("robot")
+    before = [batch.seeds for batch in env.batches]
+    assert set(env.seed(7)) == {None}
+    env.reset()
+    assert [batch.seeds for batch in env.batches] == before
+    with pytest.raises(AttributeError, match="no environment has its own action_masks"):
+        env.env_method("action_masks")

@@ -12,9 +12,10 @@ from swarm_mj.protocol import asynchronous_window, window
 from swarm_mj.protocol.asynchronous_window import UnderWay
 from swarm_mj.protocol.buffers import BROADCAST, empty_buffers
 from swarm_mj.radio.asynchronous import AsynchronousChannel
-from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.radio.power_law import PowerLaw
+from swarm_mj.radio.reception import Reception
 
 A, B, C = range(3)
 

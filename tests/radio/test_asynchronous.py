@@ -10,9 +10,10 @@ from swarm_mj.policies.registry import make_policy
 from swarm_mj.protocol.asynchronous_window import UnderWay, window
 from swarm_mj.protocol.buffers import empty_buffers
 from swarm_mj.radio.asynchronous import AIRTIME, GUARD, AsynchronousChannel, decode_overlapping
-from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.mission_radio import mission_radio, radio_of
 from swarm_mj.radio.power_law import PowerLaw
+from swarm_mj.radio.reception import Reception
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 

@@ -6,9 +6,10 @@ import numpy as np
 import pytest
 
 from swarm_mj.mission import paper, reference
-from swarm_mj.radio.composed import ComposedChannel, Reception
+from swarm_mj.radio.composed import ComposedChannel
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.radio.power_law import PowerLaw
+from swarm_mj.radio.reception import Reception
 
 NUM_ROBOTS = 12
 SHADOWED = {"shadowing_db": 6.0, "shadowing_distance_m": 20.0}

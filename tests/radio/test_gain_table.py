@@ -83,6 +83,18 @@ def test_between_its_pairs_a_table_takes_the_losses_of_the_nearest(table):
     np.testing.assert_allclose(lost_db, crossing_loss_db(asked), atol=4.0, rtol=0.0)
 
 
+def test_slots_of_one_mission_side_by_side_lose_no_more_than_one_alone(table):
+    """As credits replay a slot: many rows of the same mission, of other senders."""
+    known = drawn_places(60, seed=3)
+    channel = table(known, friis_db(known) - 10.0)
+    rows = np.zeros(3, dtype=int)
+    everyone = np.ones((3, MISSION.num_robots), dtype=bool)
+    place_m = np.random.default_rng(9).uniform(-HALF_M, HALF_M, (1, MISSION.num_robots, 2))
+    alone_mw = channel.received_mw(place_m, rows[:1], everyone[:1]).copy()
+    together_mw = channel.received_mw(np.repeat(place_m, 3, axis=0), rows, everyone)
+    np.testing.assert_array_equal(together_mw, alone_mw)
+
+
 def test_eq4_receptions_over_a_table_of_free_space_are_those_of_free_space(table):
     known = drawn_places(100, seed=7)
     channel = table(known, friis_db(known))

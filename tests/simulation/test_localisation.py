@@ -23,7 +23,7 @@ def localised(num_missions=50, **fields):
 def errors(localisation, velocity_mps, num_windows):
     """Of robots in the origin with this velocity, window by window [m]."""
     states = RobotStates(position_m=np.zeros_like(velocity_mps), velocity_mps=velocity_mps)
-    return np.stack([localisation.observed(states).own_m for _ in range(num_windows)])
+    return np.stack([localisation.advance(states).own_m for _ in range(num_windows)])
 
 
 @pytest.mark.parametrize(("std_m", "time_s"), [(5.0, 0.5), (1.0, 0.2), (20.0, 0.0)])

@@ -258,7 +258,7 @@ TASKS = {"fig4": "stationary", "fig5": "random-walk", "fig6": "flocking"}
 
 def test_the_one_network_is_below_the_published_gnns_at_every_point_of_three_figures():
     """In age and velocity variance, in each of its three trainings."""
-    flown = rows(program.read_work("one", program.Settings()).tables[0])
+    flown = rows(program.read_work("one", program.Settings()).tables.flights)
     num_compared = 0
     for point in points():
         task = TASKS.get(point.figure.partition("_")[0])
@@ -279,7 +279,7 @@ def test_the_one_network_is_below_the_published_gnns_at_every_point_of_three_fig
 def test_committed_policies_are_of_the_experiment_as_it_stands(figure):
     work = program.read_work(figure, program.Settings())
     assert work.is_trained, "make reproduce trains them anew"
-    assert len({row["commit"] for row in rows(work.tables[1])}) == 1
+    assert len({row["commit"] for row in rows(work.tables.trainings)}) == 1
 
 
 def options_of(words):

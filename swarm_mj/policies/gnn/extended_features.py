@@ -76,7 +76,7 @@ Flags = Bool[np.ndarray, "B N N"]
 Nodes = Shaped[np.ndarray, "B N N"]  # of `NODE` or `LOCAL_NODE`
 OwnNodes = Shaped[np.ndarray, "N"]  # those of one robot's graph
 Timestamps = Float32[np.ndarray, "N"]
-Column = Float32[np.ndarray, "N"]  # a field of one robot's nodes
+OfNodes = Float32[np.ndarray, "N"]  # a field of one robot's nodes
 
 
 class ExtendedColumns(NamedTuple):
@@ -84,11 +84,11 @@ class ExtendedColumns(NamedTuple):
 
     is_known: Bool[np.ndarray, "N"]
     ranges: Float[np.ndarray, "N"]  # how far off each of them is believed to be [ranges]
-    timestamp_age: Column
-    heard_age: Column
-    attempt_age: Column
-    addressed_age: Column
-    neighbours: Column
+    timestamp_age: OfNodes
+    heard_age: OfNodes
+    attempt_age: OfNodes
+    addressed_age: OfNodes
+    neighbours: OfNodes
     near: Int[np.ndarray, "N"]  # those in range, one after the other
     beliefs: Beliefs
 
@@ -97,11 +97,11 @@ class Turns(NamedTuple):
     """Room for whose turn it is, by the beliefs of one robot."""
 
     asked: Int[np.ndarray, "N"]  # to join, one after the other
-    rank: Column
-    has_turn_1_5: Column
-    has_turn_2: Column
-    has_turn_3: Column
-    has_joined: Column
+    rank: OfNodes
+    has_turn_1_5: OfNodes
+    has_turn_2: OfNodes
+    has_turn_3: OfNodes
+    has_joined: OfNodes
     slot: Slot
 
 

@@ -13,7 +13,7 @@ from jaxtyping import Float
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.policy import Parameters
-from swarm_mj.policies.policy_config import NO_BOUND, GnnShape, Weights
+from swarm_mj.policies.policy_config import NO_BOUND, GnnShape, Tensors
 
 if TYPE_CHECKING:
     from swarm_mj.policies.gnn.network import Network
@@ -27,7 +27,7 @@ class StoredGnn:
     """A network as its file holds it: what one of torch's can be made of."""
 
     shape: GnnShape
-    weights: Weights
+    weights: Tensors
     own: str = ""  # the name of its class, as `module:Name`, if it is a user's own
 
 
@@ -100,7 +100,7 @@ class GnnPolicy(LearnedPolicy):
         )
         return logits
 
-    def identity(self) -> tuple[object, Weights]:
+    def identity(self) -> tuple[object, Tensors]:
         """Return what the network is made of and sees, and its weights now."""
         made_of = (self._network.shape, self._extractor.names, self._silence_logit)
         if self._most_speech != NO_BOUND:  # else the digest stays that of earlier versions

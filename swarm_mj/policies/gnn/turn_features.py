@@ -22,6 +22,7 @@ from swarm_mj.system.compiled import compiled
 # How far apart robots are that are due at once, in `TurnNode`'s order [ranges]. The shortest are
 # for ranges as wide as the area, where the nearest of many senders is decoded.
 DISTANCES_APART = np.array([0.15, 0.25, 0.35, 0.5, 0.7, 1.0, 1.5, 2.0, 3.0])
+AT_015, AT_025, AT_035, AT_05, AT_07, AT_1, AT_15, AT_2, AT_3 = range(9)  # the place of each
 MOST_HOPS = 10  # counted; parents of news from different times may lead in a circle
 MANY_HOPS = 5.0  # that count as 1
 
@@ -423,15 +424,24 @@ def _write_place(
     """Write where k stands in the tree of P, and in the turns; and the robot's own turns."""
     node.behind = shares[int(tree.behind[k])]
     node.hops = tree.hops[k] / MANY_HOPS
-    node.due_015, node.own_due_015 = is_due[0, k], is_due[0, i]
-    node.due_025, node.own_due_025 = is_due[1, k], is_due[1, i]
-    node.due_035, node.own_due_035 = is_due[2, k], is_due[2, i]
-    node.due_05, node.own_due_05 = is_due[3, k], is_due[3, i]
-    node.due_07, node.own_due_07 = is_due[4, k], is_due[4, i]
-    node.due_1, node.own_due_1 = is_due[5, k], is_due[5, i]
-    node.due_15, node.own_due_15 = is_due[6, k], is_due[6, i]
-    node.due_2, node.own_due_2 = is_due[7, k], is_due[7, i]
-    node.due_3, node.own_due_3 = is_due[8, k], is_due[8, i]
+    node.due_015 = is_due[AT_015, k]
+    node.own_due_015 = is_due[AT_015, i]
+    node.due_025 = is_due[AT_025, k]
+    node.own_due_025 = is_due[AT_025, i]
+    node.due_035 = is_due[AT_035, k]
+    node.own_due_035 = is_due[AT_035, i]
+    node.due_05 = is_due[AT_05, k]
+    node.own_due_05 = is_due[AT_05, i]
+    node.due_07 = is_due[AT_07, k]
+    node.own_due_07 = is_due[AT_07, i]
+    node.due_1 = is_due[AT_1, k]
+    node.own_due_1 = is_due[AT_1, i]
+    node.due_15 = is_due[AT_15, k]
+    node.own_due_15 = is_due[AT_15, i]
+    node.due_2 = is_due[AT_2, k]
+    node.own_due_2 = is_due[AT_2, i]
+    node.due_3 = is_due[AT_3, k]
+    node.own_due_3 = is_due[AT_3, i]
 
 
 @compiled(forceinline=True, makes_arrays=False)

@@ -53,9 +53,10 @@ def decide(
     has_sent: Bool[np.ndarray, "B N"],
     has_decoded: Bool[np.ndarray, "B N"],
     covered: Float[np.ndarray, "B N"],
-    drawn: Float[np.ndarray, "B 2 N"],
+    begin_draw: Float[np.ndarray, "B N"],
+    silence_draw: Float[np.ndarray, "B N"],
     phase: int,
-    minislot: Float[np.ndarray, "B N"],
+    share: Float[np.ndarray, "B N"],
     shift_db: Float[np.ndarray, "B N"],
 ) -> None:
     """Say when each robot begins in the next slot, and how loud its channel may be.
@@ -69,9 +70,10 @@ def decide(
         has_sent: Who transmitted in the last slot, [B N].
         has_decoded: Who decoded a packet in it, [B N].
         covered: The share of each robot's range that the sender it decoded covers, [B N].
-        drawn: Numbers from 0 to 1: for the minislot, and for silence.
+        begin_draw: Numbers from 0 to 1, [B N], by which robots of like gain begin apart.
+        silence_draw: Numbers from 0 to 1, [B N], by which those of little gain are silent.
         phase: The slot's place among those with shifts of their own.
-        minislot: In which each robot begins, as a share of all minislots; infinite: it is silent.
+        share: After which share of all minislots each robot begins; infinite: it is silent.
             Written.
         shift_db: By how much the channel may be louder than usual [dB]; written.
     """
@@ -95,14 +97,14 @@ def decide(
                 silence += weights.in_silence[b, f] * features[f]
                 sensing_db += weights.in_sensing_db[b, f] * features[f]
 
-            share = (first - index) / octaves + weights.drawn[b, 0] * drawn[b, 0, i]
-            minislot[b, i] = min(max(share, 0.0), 1.0)
+            place = (first - index) / octaves + weights.drawn[b, 0] * begin_draw[b, i]
+            share[b, i] = min(max(place, 0.0), 1.0)
             silence = min(max(silence, -MOST_SILENCE), MOST_SILENCE)
             # A logistic draw: robots with a little too little transmit at times.
-            odds = np.log(drawn[b, 1, i] + TINY) - np.log(1.0 - drawn[b, 1, i] + TINY)
+            odds = np.log(silence_draw[b, i] + TINY) - np.log(1.0 - silence_draw[b, i] + TINY)
             over = octave - weights.threshold[b, 0] + silence + weights.softness[b, 0] * odds
             if record.has_sent[b, i] and over <= 0.0:
-                minislot[b, i] = np.inf
+                share[b, i] = np.inf
 
             sensing_db = min(max(sensing_db, -MOST_SENSED_DB), MOST_SENSED_DB)
             sensing_db += weights.shift_db[b, phase]

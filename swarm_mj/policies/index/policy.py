@@ -124,8 +124,8 @@ class IndexCsma(SensingPolicy):
     def _by_index(self, views: LocalViews, slot: int) -> Contention:
         """Note the slot that has ended, and return the contention of one that is no turn."""
         silence = views.silence
-        heard = views.phases[-1].heard if views.phases else silence
-        recipient = views.phases[-1].recipient if views.phases else silence
+        heard = views.last_heard
+        recipient = views.last_recipient
         has_sent = recipient != silence
         self._follow_packets(views, recipient)
         buffers = views.buffers
@@ -143,6 +143,7 @@ class IndexCsma(SensingPolicy):
             range_m=self._range_m,
             weights=self._its,
         )
+        begin_draw, silence_draw = self._uniform.next().swapaxes(0, 1)
         share = np.empty(silence.shape)
         shift_db = np.empty(silence.shape)
         decide(
@@ -154,9 +155,10 @@ class IndexCsma(SensingPolicy):
             has_sent=has_sent,
             has_decoded=heard != silence,
             covered=covered_share(views, self._range_m),
-            drawn=self._uniform.next(),
+            begin_draw=begin_draw,
+            silence_draw=silence_draw,
             phase=slot % NUM_SHIFTS,
-            minislot=share,
+            share=share,
             shift_db=shift_db,
         )
         minislot = np.floor(self._num_minislots * share)

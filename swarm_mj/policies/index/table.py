@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32, Int, Int8, Int16
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.policies.index.weights import MOST, Weights
 from swarm_mj.protocol.buffers import ABSENT
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, rise
 from swarm_mj.system.compiled import compiled
 
 MAX_ROWS = 32  # a robot's; of more neighbours, those without a row count as those with one
@@ -95,7 +95,7 @@ def raise_bound(
 ) -> None:
     """Raise a bound by a share of what it lacks of a packet's T."""
     for k in range(len(bound)):
-        bound[k] += share * max(np.float32(0.0), packet[k] - bound[k])
+        bound[k] += share * rise(packet[k], bound[k])
 
 
 @compiled(makes_arrays=False)
@@ -115,7 +115,7 @@ def lacking(own: Float32[np.ndarray, "N"], bound: Float32[np.ndarray, "N"]) -> f
     """Return by how much a packet with this T would raise a bound, sum over entries [windows]."""
     total = np.float32(0.0)
     for k in range(len(bound)):
-        total += max(np.float32(0.0), own[k] - bound[k])
+        total += rise(own[k], bound[k])
     return float(total)
 
 

@@ -17,7 +17,7 @@ from swarm_mj.policies.planner.assent import Assent, turns_every
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import TeamView
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW, slot_of
 from swarm_mj.radio.links import Links
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.system.decibels import from_db
@@ -219,6 +219,5 @@ def _known_until(view: TeamView, first_slot: int) -> Int[np.ndarray, "N N"]:
     Slots count from the first one. T is when the slot ended in which i sent what j knows of it, and
     in that packet i could only tell of the slots before.
     """
-    ended = np.rint(view.timestamp * SLOTS_PER_WINDOW).astype(np.int64)
-    sent_in = ended - 1 - first_slot
+    sent_in = slot_of(view.timestamp) - 1 - first_slot
     return sent_in - 1

@@ -140,7 +140,7 @@ def _start(frame: Frame) -> int:
 # a single `or`. Row i is what robot i knows, and column w S + t is what it knows of the w-th 64
 # subjects in the trial of slot t. Subjects are the robots that transmit.
 WORD = 64  # subjects in a word
-Known = UInt64[np.ndarray, "C"]  # of one robot
+KnownBits = UInt64[np.ndarray, "C"]  # of one robot
 Words = UInt64[np.ndarray, "R C"]  # rows of them
 
 
@@ -222,7 +222,9 @@ def _spread(frame: Frame, tried: Heard, known: Words, younger: Words) -> Int[np.
 
 
 @compiled()
-def _learn(mine: Known, sent: Known, tried: Known, s: int, num_slots: int, news: Known) -> bool:
+def _learn(
+    mine: KnownBits, sent: KnownBits, tried: KnownBits, s: int, num_slots: int, news: KnownBits
+) -> bool:
     """Add what is heard in slot s, and `tried` in the trial of s; return whether any is `news`."""
     found = np.uint64(0)
     for c in range(mine.shape[0]):
@@ -239,7 +241,7 @@ def _learn(mine: Known, sent: Known, tried: Known, s: int, num_slots: int, news:
 
 
 @compiled()
-def _weigh(known: Known, value: Words, times: int, gained: Int[np.ndarray, "C"]) -> None:
+def _weigh(known: KnownBits, value: Words, times: int, gained: Int[np.ndarray, "C"]) -> None:
     """Add the values of all subjects known, in binary, times a number.
 
     Digit by digit: the sum is that of 2 ** p times how many of them have this digit.

@@ -29,7 +29,7 @@ from swarm_mj.policies.sotdma.frame import Rule, frame_slots
 from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, slot_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.radio.power_law import PowerLaw, write_powers
@@ -177,8 +177,7 @@ class SotdmaTeam:
     def _last_transmissions(self, view: TeamView) -> Int[np.ndarray, "N N"]:
         """Return in which slot each robot last transmitted, as each knows; [i, k] is of k."""
         # A robot observes itself as it transmits, so T is the end of that slot.
-        ends = np.rint(SLOTS_PER_WINDOW * view.timestamp).astype(np.int64)
-        return ends - 1 - (self._first_slot or 0)
+        return slot_of(view.timestamp) - 1 - (self._first_slot or 0)
 
     def _read(
         self, table: SlotTable, view: TeamView, known: Int[np.ndarray, "N N"], slot: int
