@@ -11,7 +11,7 @@ import sys
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import matplotlib.pyplot as plt
 import numpy as np
@@ -23,26 +23,49 @@ from matplotlib.patches import Circle, FancyArrowPatch, FancyBboxPatch
 from swarm_mj.cli import script
 from swarm_mj.mission import paper
 from swarm_mj.policies import make_policy
+from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.radio.mission_radio import radio_of
 from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.fields import setting
 from swarm_mj.system.writing import write_text
 
-# What a colour is for: as matplotlib draws it, on a light page, on a dark page.
-COLOURS = {
-    "ink": ("#010101", "#1f2328", "#e6edf3"),
-    "muted": ("#010102", "#656d76", "#9da7b3"),
-    "card": ("#010103", "#f6f8fa", "#161b22"),
-    "line": ("#010104", "#c4ccd4", "#3d444d"),
-    "blue": ("#010105", "#0969da", "#58a6ff"),
-    "orange": ("#010106", "#bc4c00", "#f0883e"),
-    "pale_blue": ("#010107", "#cfe8ff", "#143556"),
-    "pale_orange": ("#010108", "#ffe2cc", "#4a2a12"),
-}
-INK, MUTED, CARD, LINE, BLUE, ORANGE, PALE_BLUE, PALE_ORANGE = (
-    drawn for drawn, _, _ in COLOURS.values()
+
+class Ink(NamedTuple):
+    """A colour of diagrams."""
+
+    name: str  # in the file's style
+    drawn: str  # by matplotlib, in whose file no other colour is like it
+    light: str  # on a light page
+    dark: str  # on a dark page
+
+
+TEXT_INK = Ink("ink", "#010101", "#1f2328", "#e6edf3")
+MUTED_INK = Ink("muted", "#010102", "#656d76", "#9da7b3")
+CARD_INK = Ink("card", "#010103", "#f6f8fa", "#161b22")
+LINE_INK = Ink("line", "#010104", "#c4ccd4", "#3d444d")
+BLUE_INK = Ink("blue", "#010105", "#0969da", "#58a6ff")
+ORANGE_INK = Ink("orange", "#010106", "#bc4c00", "#f0883e")
+PALE_BLUE_INK = Ink("pale_blue", "#010107", "#cfe8ff", "#143556")
+PALE_ORANGE_INK = Ink("pale_orange", "#010108", "#ffe2cc", "#4a2a12")
+INKS = (
+    TEXT_INK,
+    MUTED_INK,
+    CARD_INK,
+    LINE_INK,
+    BLUE_INK,
+    ORANGE_INK,
+    PALE_BLUE_INK,
+    PALE_ORANGE_INK,
 )
+INK = TEXT_INK.drawn
+MUTED = MUTED_INK.drawn
+CARD = CARD_INK.drawn
+LINE = LINE_INK.drawn
+BLUE = BLUE_INK.drawn
+ORANGE = ORANGE_INK.drawn
+PALE_BLUE = PALE_BLUE_INK.drawn
+PALE_ORANGE = PALE_ORANGE_INK.drawn
 STYLE: dict[Any, Any] = {
     "axes.edgecolor": LINE,
     "axes.facecolor": "none",
@@ -81,10 +104,10 @@ def themed(figure: Figure) -> str:
     figure.savefig(drawn, format="svg", metadata={"Date": None})
     plt.close(figure)
     svg = drawn.getvalue()
-    for name, (placeholder, _, _) in COLOURS.items():
-        svg = svg.replace(placeholder, f"var(--{name})")
-    light = "".join(f"--{name}:{light};" for name, (_, light, _) in COLOURS.items())
-    dark = "".join(f"--{name}:{dark};" for name, (_, _, dark) in COLOURS.items())
+    for ink in INKS:
+        svg = svg.replace(ink.drawn, f"var(--{ink.name})")
+    light = "".join(f"--{ink.name}:{ink.light};" for ink in INKS)
+    dark = "".join(f"--{ink.name}:{ink.dark};" for ink in INKS)
     rules = f":root{{{light}}}@media(prefers-color-scheme:dark){{:root{{{dark}}}}}"
     return svg.replace("<defs>", f"<defs>\n  <style>{rules}</style>", 1)
 
@@ -198,7 +221,7 @@ def draw_sinr() -> Figure:
     ):
         place = np.concatenate([senders, listeners])[None]
         recipient = np.arange(place.shape[1])[None].copy()
-        recipient[0, transmitting] = -1
+        recipient[0, transmitting] = BROADCAST
         heard: Int[np.ndarray, "B N"] = radio_of(mission)(place, recipient)
         for sender, pale in ((0, PALE_BLUE), (1, PALE_ORANGE)):
             decodes = (heard[0, 2:] == sender).reshape(145, 241).astype(float)

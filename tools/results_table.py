@@ -42,6 +42,7 @@ PUBLISHED = (
 )
 COSTS = (("aoi", ".1f"), ("velocity_variance", ".3f"))  # that the paper published, and their digits
 FACTS = ("payload", "uses", "beyond_paper")  # that a row may say itself
+OF_TABLES = ("function", "results", "where", "head", "columns", "rows", "more", "order", "form")
 OWN = ("head", "results", "form", "fact", *FACTS)  # keys of a row or a column that no result has
 sys.path.append(str(ROOT / "training"))  # where the modules are that make tables
 
@@ -51,6 +52,9 @@ def table(spec: dict[str, Any], folder: Path) -> str:
 
     Raises ValueError if a cell could be one of several results, or there is nothing to show.
     """
+    unknown = spec.keys() - set(OF_TABLES)
+    if unknown:
+        raise ValueError(f"a table has no {', '.join(sorted(unknown))}; it has {OF_TABLES}")
     if function := spec.get("function"):
         return _made(function, _sources(spec), folder)
     columns = _listed(spec["columns"])
@@ -92,12 +96,12 @@ def _sources(*parts: dict[str, Any]) -> list[str]:
 
 def _by_age(spec: dict[str, Any], columns: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
     """Return a row for each policy found, the lowest mean over the columns first."""
-    where = spec.get("where", {})
-    found = [
-        row
-        for column in columns
-        for row in select(read(_sources(spec, column), folder), where | _keys(column))
-    ]
+    found: Rows = []
+    for column in columns:
+        rows = read(_sources(spec, column), folder)
+        where = spec.get("where", {}) | _keys(column)
+        _check_keys(where, rows)
+        found += select(rows, where)
     ages: dict[str, list[float]] = {}
     for row in found:
         ages.setdefault(row["policy"], []).append(row[spec.get("order", "aoi_mean")])
@@ -115,13 +119,25 @@ def _cell(
     if fact := column.get("fact"):
         return row.get(fact) or _fact(row["policy"], fact)
     where = spec.get("where", {}) | _keys(column) | _keys(row)
-    found = select(read(_sources(spec, column, row), folder), where)
+    rows = read(_sources(spec, column, row), folder)
+    _check_keys(where, rows)
+    found = select(rows, where)
     if len(found) > 1:
         raise ValueError(f"{len(found)} results have {where}; name what tells them apart")
     used += found
     form = row.get("form") or column.get("form") or spec.get("form", AGE)
     beside = [PUBLISHED.format(*cost) for cost in COSTS if form.startswith(f"{{{cost[0]}_mean:")]
     return "".join(shown(each, part) for each in found for part in (form, *beside))
+
+
+def _check_keys(where: Row, rows: Rows) -> None:
+    """Raise ValueError for a key that no result has: its cell would be empty in silence."""
+    known = {"figure"}  # which the paper's points have, and no results
+    for row in rows:
+        known |= row.keys()
+    unknown = where.keys() - known
+    if rows and unknown:
+        raise ValueError(f"no result has a column {', '.join(sorted(unknown))}; name one of theirs")
 
 
 def shown(row: Row, form: str) -> str:

@@ -5,7 +5,7 @@ from pathlib import Path
 from typing import Unpack
 
 from swarm_mj.api.evaluate import check_named
-from swarm_mj.api.fly import mission_of
+from swarm_mj.api.fly import mission_of, names_of
 from swarm_mj.evaluation.convergence import Convergence, Goal, converging
 from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.study import Study
@@ -101,8 +101,8 @@ def check_convergence(
         seed=seed,
         probability=probability,
         is_deterministic=is_deterministic,
-        features=(features,) if isinstance(features, str) else tuple(features),
-        networks=(networks,) if isinstance(networks, str) else tuple(networks),
+        features=names_of(features),
+        networks=names_of(networks),
         components=Components(**components),
     )
     options = EngineOptions(jobs=num_jobs)

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Unpack
 
 from swarm_mj.api.flight_summary import Metrics
-from swarm_mj.api.fly import mission_of
+from swarm_mj.api.fly import mission_of, names_of
 from swarm_mj.evaluation.batch import BatchCosts
 from swarm_mj.evaluation.engines import EngineOptions
 from swarm_mj.evaluation.flying import fly_study
@@ -224,8 +224,8 @@ def evaluate(
         probability=probability,
         is_deterministic=is_deterministic,
         baseline=None if baseline is None else str(baseline),
-        features=(features,) if isinstance(features, str) else tuple(features),
-        networks=(networks,) if isinstance(networks, str) else tuple(networks),
+        features=names_of(features),
+        networks=names_of(networks),
         components=Components(**components),
     )
     options = EngineOptions(jobs=num_jobs, engine=engine, address=address)

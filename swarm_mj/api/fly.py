@@ -3,7 +3,7 @@
 import inspect
 import math
 import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import fields
 from pathlib import Path
 from typing import Unpack
@@ -92,12 +92,12 @@ def fly(
         ```
     """
     mission = mission_of(fly, task, mission_fields)
-    named = (features,) if isinstance(features, str) else tuple(features)
+    named = names_of(features)
     arguments = PolicyArguments(
         probability=probability,
         is_deterministic=is_deterministic,
         features=named,
-        networks=(networks,) if isinstance(networks, str) else tuple(networks),
+        networks=names_of(networks),
     )
     _check_shown(live, speed, record=record)
     made, name = _policy_of(policy, mission, arguments)
@@ -152,6 +152,11 @@ def mission_of(
         rule = f"you gave a finished mission, so {', '.join(mission_fields)} must be part of it"
         raise TypeError(f"{rule}: dataclasses.replace(mission, {given})")
     return make_mission(task, **mission_fields)
+
+
+def names_of(given: str | Iterable[str]) -> tuple[str, ...]:
+    """Return names of which one may be given by itself."""
+    return (given,) if isinstance(given, str) else tuple(given)
 
 
 def _policy_of(

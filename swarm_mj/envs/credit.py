@@ -216,10 +216,11 @@ def _decoded_in_turn(
     heard_answer = heard.copy()
     heard[:num_missions], heard_answer[:num_missions] = world.decoded(missions, recipient)
     for n in range(1, int(turn.max(initial=0)) + 1):
-        its = world.decoded(missions, np.where(turn == n, otherwise, recipient))
-        mission, robot = np.nonzero(turn == n)
-        heard[row[mission, robot]] = its[0][mission]
-        heard_answer[row[mission, robot]] = its[1][mission]
+        its_turn = turn == n
+        decoded, decoded_answer = world.decoded(missions, np.where(its_turn, otherwise, recipient))
+        mission, robot = np.nonzero(its_turn)
+        heard[row[mission, robot]] = decoded[mission]
+        heard_answer[row[mission, robot]] = decoded_answer[mission]
     return heard, heard_answer
 
 

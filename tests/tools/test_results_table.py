@@ -121,6 +121,20 @@ def test_a_missing_cell_is_empty_and_a_table_without_numbers_is_refused(made):
         table(BY_RANGE | {"rows": ["aloha"]}, folder)
 
 
+@pytest.mark.parametrize(
+    ("misspelt", "said"),
+    [
+        ({"ordre": "aoi_median"}, "a table has no ordre; it has "),
+        ({"where": {"tsak": "flocking"}}, "no result has a column tsak; name one of theirs"),
+        ({"rows": [{"polycy": "mst"}]}, "no result has a column polycy; name one of theirs"),
+    ],
+)
+def test_a_misspelt_key_is_refused_and_leaves_no_empty_cell(made, misspelt, said):
+    folder = made(ranges("mst", (43.0, 1.0), (16.5, 0.1)))
+    with pytest.raises(ValueError, match=said):
+        table(BY_RANGE | misspelt, folder)
+
+
 def test_names_say_what_packets_carry_and_what_is_no_policy(made):
     rows = [
         result("planner", aoi_mean=1.0, payload="snapshots"),

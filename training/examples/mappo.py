@@ -19,6 +19,7 @@ from torch.distributions import Categorical
 import swarm_mj
 from swarm_mj.envs.mission_batch import FIRST_TRAINING_SEED, MissionBatch
 from swarm_mj.envs.options import make_batch, truth, truth_space
+from swarm_mj.mission import paper
 
 SEED, NUM_ROBOTS, NUM_WINDOWS = 0, 5, 100
 NUM_MISSIONS, NUM_ROUNDS = 16, 60  # flown side by side, and one after the other
@@ -115,9 +116,9 @@ def improve(
 def train() -> list[tuple[int, float]]:
     """Return windows flown so far, and the age of information then [windows]."""
     torch.manual_seed(SEED)
-    options = {"num_robots": NUM_ROBOTS, "num_windows": NUM_WINDOWS}
-    batch = make_batch("stationary", NUM_MISSIONS, **options)
-    held_out = make_batch("stationary", len(HELD_OUT), **options)
+    mission = paper("stationary", num_robots=NUM_ROBOTS, num_windows=NUM_WINDOWS)
+    batch = make_batch(mission, NUM_MISSIONS)
+    held_out = make_batch(mission, len(HELD_OUT))
     network = ActorCritic(batch.num_features, truth_space(batch.mission).shape[0])
     optimiser = torch.optim.Adam(network.parameters(), lr=LEARNING_RATE)
     curve = []

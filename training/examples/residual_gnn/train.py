@@ -10,6 +10,7 @@ the run's folder.
 """
 
 import sys
+from collections.abc import Mapping
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
@@ -25,12 +26,13 @@ from residual_gnn.training_run import (
 )
 from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper
+from swarm_mj.mission.keywords import MissionFields
 from swarm_mj.system.fields import as_typed, setting
 from swarm_mj.system.packages import commit
 from swarm_mj.system.writing import Output, check_outputs, owned
 
 WINDOWS = 250  # of a mission that is learned from
-KINDS = {  # what 40 robots at rest meet; they believe in free space
+KINDS: dict[str, MissionFields] = {  # what 40 robots at rest meet; they believe in free space
     "free space": {},
     "30 % erased": {"erasure": 0.3},
     "shadowing": {"shadowing_db": 6.0},
@@ -108,7 +110,7 @@ class Residual:
     def training(self) -> ResidualTraining:
         """Return the settings of the training."""
         return ResidualTraining(
-            missions={name: self._mission(**channel) for name, channel in KINDS.items()},
+            missions={name: self._mission(channel) for name, channel in KINDS.items()},
             ppo=PpoSettings(learning_rate=self.learning_rate, epochs=self.epochs),
             corrects_turns=self.corrects_turns,
             seed=self.seed,
@@ -117,8 +119,9 @@ class Residual:
             held_out=self.held_out,
         )
 
-    def _mission(self, **channel: object) -> Mission:
-        return paper("stationary", num_robots=self.robots, num_windows=self.windows, **channel)
+    def _mission(self, channel: MissionFields) -> Mission:
+        team: MissionFields = {"num_robots": self.robots, "num_windows": self.windows}
+        return paper("stationary", **(team | channel))
 
     def _card(self, progress: Progress, at: int, ratios: dict[int, float]) -> str:
         """Return the model card: training, settings and selection."""
@@ -189,7 +192,7 @@ Apache-2.0, as swarm_mj.
 """
 
 
-def _options(channel: dict[str, object]) -> str:
+def _options(channel: Mapping[str, object]) -> str:
     """Return a kind's options, as they are typed."""
     typed = (f"`--{name.replace('_', '-')} {value}`" for name, value in channel.items())
     return ": " + " ".join(typed) if channel else ""
