@@ -18,27 +18,25 @@ from mujoco._enums import mjtDyn
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.batched_rng import Started, Stream, normal
-from swarm_mj.mission.bodies import LEAST_HEIGHT_M
+from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.faults import MIN_SURVIVORS
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.energy import Motors, motors_of, use_energy
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import GRAVITY_MPS2, Pilot, Sensed, SetPoint
+from swarm_mj.physics.robot_model import FREE_QPOS, PLANAR_QPOS, collides, is_motor
 from swarm_mj.physics.robots import (
-    FREE_QPOS,
     FREE_QVEL,
-    PLANAR_QPOS,
     OwnPilot,
     RobotKind,
-    collides,
-    is_motor,
     kinds_of,
     make_pilots,
     sensor_limits,
 )
 from swarm_mj.physics.scene import AIR_DENSITY, Scene, compiled_scene, compose, num_body_steps
+from swarm_mj.physics.set_points import hold_places, move_set_points
 from swarm_mj.physics.state import RobotStates
+from swarm_mj.physics.wind import Wind
 from swarm_mj.physics.worlds import check_accelerations
 from swarm_mj.system.compiled import compiled
 from swarm_mj.system.user_code import is_ours
@@ -48,8 +46,6 @@ VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robo
 FARTHEST = 1e6  # no robot of a stable model gets so far [m], or so fast [m/s and rad/s]
 # Of what has crashed [rad/s]: in a storm it tumbles, and Euler's steps would spin it up for ever.
 MOST_TUMBLING_RPS = 100.0
-RESTS_MPS = 1e-6  # a set point slower than this is 0: sums of accelerations end a rounding away
-RETURN_PER_S = 0.6  # speed towards a place over the way to it: a pilot's velocities settle faster
 
 
 class _Flown(NamedTuple):
@@ -112,7 +108,7 @@ class BodyWorlds:
         self.obstacles = found if len(found.kind) > 0 else None
         self._batch = batch.Batch(self._model, num_missions, num_threads)
         self._act = self._batch.bind("act")
-        self._wind = self._batch.expand("opt.wind") if mission.has_wind else None
+        self._wind = Wind(mission, self._batch.expand("opt.wind")) if mission.has_wind else None
         self._num_steps = num_body_steps(mission, kinds)
         self._step_s = mission.window_s / self._num_steps
         pilots = make_pilots(kinds, self._step_s, pilot)
@@ -206,11 +202,8 @@ class BodyWorlds:
         for flown in self._flown:
             if isinstance(flown.pilot, Started):
                 flown.pilot.start(flown.kind.num_robots, pilot_rngs)
-        self._gusts = Stream(rngs, normal, (2,)) if self._mission.gust_mps > 0.0 else None
-        self._gust_mps = np.zeros((len(rngs), 2))
-        if self._gusts is not None:
-            self._gust_mps = self._mission.gust_mps * self._gusts.next()
-        self._blow()
+        if self._wind is not None:
+            self._wind.start(rngs)
 
     def _vary(self, rngs: Sequence[np.random.Generator]) -> None:
         """Make each robot heavier or lighter, and its motors stronger or weaker, than its model.
@@ -240,20 +233,6 @@ class BodyWorlds:
         for kind, number in zip(self._kinds, numbers, strict=True):
             by_robot += [number] * kind.num_robots
         return np.repeat(np.arange(len(by_robot)), by_robot)
-
-    def _blow(self) -> None:
-        """Set the wind of the next window: its mean to the east, and the gust of each mission."""
-        if self._wind is not None:
-            self._wind[:, 0] = self._mission.wind_mps + self._gust_mps[:, 0]
-            self._wind[:, 1] = self._gust_mps[:, 1]
-
-    def _change_gusts(self) -> None:
-        """Let gusts change by a window: a first-order Gauss-Markov process of constant variance."""
-        if self._gusts is not None:
-            kept = np.exp(-self._mission.window_s / self._mission.gust_s)
-            fresh_mps = self._mission.gust_mps * self._gusts.next()
-            self._gust_mps = kept * self._gust_mps + np.sqrt(1.0 - kept**2) * fresh_mps
-        self._blow()
 
     def place(
         self, position_m: Float[np.ndarray, "B N 3"], velocity_mps: Float[np.ndarray, "B N 3"]
@@ -324,7 +303,7 @@ class BodyWorlds:
         """Move all robots one window on; ValueError for a wrong u or a model that is unstable."""
         check_accelerations(acceleration_mps2, self.states.position_m.shape)
         mission = self._mission
-        _move_set_points(
+        move_set_points(
             acceleration=acceleration_mps2,
             position=self.states.position_m,
             dt_s=mission.window_s,
@@ -334,7 +313,7 @@ class BodyWorlds:
             course_mps=self._course_mps,
             height_m=self._height_m,
         )
-        _hold_places(
+        hold_places(
             position=self.states.position_m,
             course_mps=self._course_mps,
             dt_s=mission.window_s,
@@ -359,7 +338,8 @@ class BodyWorlds:
                     _note_contacts(flown.contact_n, flown.has_crashed)
                     _slow_tumbling(flown.has_crashed, flown.qvel)
         self._take_states()
-        self._change_gusts()
+        if self._wind is not None:
+            self._wind.change()
         self._count_active()
         return self.states
 
@@ -397,7 +377,7 @@ class BodyWorlds:
             has_crashed=self._has_crashed.copy(),
             sensors=sensors,
             thrust=thrust,
-            wind_mps=None if self._wind is None else self._wind[:, :PLANE].copy(),
+            wind_mps=None if self._wind is None else self._wind.now_mps,
             energy_j=self._energy_j.copy(),
         )
 
@@ -488,61 +468,6 @@ def _sensed(flown: _Flown) -> Sensed:
     attitude[..., 3] = np.sin(half)
     turn_rate_rps[..., 2] = qvel[..., PLANAR_QPOS - 1]
     return Sensed(position_m, attitude, velocity_mps, turn_rate_rps, flown.sensors)
-
-
-@compiled(makes_arrays=False)
-def _move_set_points(
-    acceleration: Float[np.ndarray, "B N 3"],
-    position: Float[np.ndarray, "B N 3"],
-    dt_s: float,
-    limit_mps2: float,
-    limit_mps: float,
-    wall_m: float,
-    course_mps: Float[np.ndarray, "B N 3"],
-    height_m: Float[np.ndarray, "B N"],
-) -> None:
-    """Accelerate, clip, and turn round at the edge; heights follow what climbs."""
-    for b in range(acceleration.shape[0]):
-        for i in range(acceleration.shape[1]):
-            for axis in range(3):
-                u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
-                v = min(max(course_mps[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
-                p = position[b, i, axis]
-                if axis < 2 and abs(p) > wall_m and p * v > 0.0:
-                    v = -v
-                course_mps[b, i, axis] = v
-            height_m[b, i] += course_mps[b, i, 2] * dt_s
-            if height_m[b, i] < LEAST_HEIGHT_M:  # it may not sink further
-                height_m[b, i] = LEAST_HEIGHT_M
-                course_mps[b, i, 2] = max(course_mps[b, i, 2], 0.0)
-
-
-@compiled(makes_arrays=False)
-def _hold_places(
-    position: Float[np.ndarray, "B N 3"],
-    course_mps: Float[np.ndarray, "B N 3"],
-    dt_s: float,
-    limit_mps: float,
-    place_m: Float[np.ndarray, "B N 2"],
-    wanted_mps: Float[np.ndarray, "B N 3"],
-) -> None:
-    """Let pilots follow the set points, and fly back to where bodies were when these came to rest.
-
-    The place of a body that moves is where it will be in a window, when its set point may rest.
-    """
-    for b in range(position.shape[0]):
-        for i in range(position.shape[1]):
-            rests = abs(course_mps[b, i, 0]) < RESTS_MPS and abs(course_mps[b, i, 1]) < RESTS_MPS
-            for axis in range(2):
-                v = course_mps[b, i, axis]
-                p = position[b, i, axis]
-                if rests:
-                    back = RETURN_PER_S * (place_m[b, i, axis] - p)
-                    v = min(max(back, -limit_mps), limit_mps)
-                else:
-                    place_m[b, i, axis] = p + v * dt_s
-                wanted_mps[b, i, axis] = v
-            wanted_mps[b, i, 2] = course_mps[b, i, 2]
 
 
 @compiled(makes_arrays=False)

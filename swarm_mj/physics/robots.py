@@ -13,31 +13,34 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float
-from mujoco._enums import mjtBias, mjtJoint, mjtObj, mjtSensor
-from mujoco._functions import mj_forward, mj_fullM, mj_name2id, mju_sparse2dense
-from mujoco._specs import MjsBody, MjSpec
-from mujoco._structs import MjData, MjModel
+from jaxtyping import Float
+from mujoco._enums import mjtSensor
+from mujoco._functions import mj_fullM, mju_sparse2dense
+from mujoco._specs import MjSpec
+from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.arena_files import read_mjcf, refused, take_over_settings
 from swarm_mj.physics.declarations import Declarations, declared_by
-from swarm_mj.physics.pilots import GRAVITY_MPS2, Airframe, Pilot, QuadrotorPilot, RoverPilot
+from swarm_mj.physics.pilots import Airframe, Pilot, QuadrotorPilot, RoverPilot
+from swarm_mj.physics.robot_checks import check_robot
+from swarm_mj.physics.robot_model import (
+    FREE_QPOS,
+    antenna_offset_m,
+    attached,
+    collides,
+    is_free_base,
+    is_motor,
+    rest_pose,
+)
 from swarm_mj.physics.state import Antennas
 from swarm_mj.system.arguments import check_component, did_you_mean
 from swarm_mj.system.decibels import from_db
 from swarm_mj.system.packages import asset
 from swarm_mj.system.user_code import make
 
-LEAST_STEP_S = 0.0005
-MOST_STEP_S = 0.01
-FREE_QPOS = 7  # of a free base: a place and a quaternion
 FREE_QVEL = 6  # of a free base: velocity and turn rate
 PLANAR_AXES = [0, 1, 5]  # of the six, which one on a plane has: along x and y, about z
-PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
-ANTENNA = "antenna"  # the site where a model has it
-MOST_ANTENNA_M = 10.0  # above or below the base
-OFF_AXIS_M = 1e-6  # as much as a compiled model rounds by
 
 OwnPilot = Pilot | type | str  # an object, a class that is made for an airframe, or its name
 CALLED_AS_PILOT = ("sensed", "wanted", "control")
@@ -86,7 +89,7 @@ class RobotKind:
     @property
     def antenna_m(self) -> float:
         """Height of the antenna over the base, while the robot is level; 0 without its site."""
-        return float(_antenna_offset_m(self.model)[2])
+        return float(antenna_offset_m(self.model)[2])
 
     @cached_property
     def reach_m(self) -> float:
@@ -165,31 +168,6 @@ class RobotKind:
         )
 
 
-def collides(model: MjModel) -> Bool[np.ndarray, "G"]:
-    """Return which geoms are of the robot, not its surroundings, and collide."""
-    has_mask = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
-    return has_mask & (model.geom_bodyid > 0)
-
-
-def is_motor(model: MjModel) -> Bool[np.ndarray, "U"]:
-    """Return which actuators' force is their control times a gain, and nothing else."""
-    return model.actuator_biastype == mjtBias.mjBIAS_NONE
-
-
-def rest_pose(model: MjModel) -> MjData:
-    """Return a robot whose base is level at the origin, or on its plane, all other joints at 0."""
-    data = MjData(model)
-    if is_free_base(model):
-        data.qpos[:FREE_QPOS] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
-    mj_forward(model, data)
-    return data
-
-
-def is_free_base(model: MjModel) -> bool:
-    """Return whether a robot's base can move and turn in all directions: it flies."""
-    return int(model.jnt_type[0]) == int(mjtJoint.mjJNT_FREE)
-
-
 def antennas_of(mission: Mission) -> Antennas | None:
     """Return the antennas of a mission's robots.
 
@@ -227,7 +205,7 @@ def kinds_of(mission: Mission) -> list[RobotKind]:
     for group in mission.groups:
         spec = _read(group.kind)
         model = _compiled(group.kind, spec)
-        _check(group.kind, spec, model)
+        check_robot(group.kind, spec, model)
         num_robots = group.num_robots
         kind = RobotKind(
             name=group.kind,
@@ -328,16 +306,11 @@ def add_robots(spec: MjSpec, kinds: Sequence[RobotKind], contype: int, conaffini
     for kind in kinds:
         take_over_settings(spec, kind.spec)
         for i in range(kind.first, kind.first + kind.num_robots):
-            added = _attached(spec, kind.spec.copy(), i)
+            added = attached(spec, kind.spec.copy(), i)
             for geom in added.find_all("geom"):
                 if geom.contype or geom.conaffinity:
                     geom.contype = contype
                     geom.conaffinity = conaffinity
-
-
-def _attached(spec: MjSpec, own: MjSpec, i: int) -> MjsBody:
-    """Attach a robot, with what refers to its parts alone, as `r{i}/`; return its base there."""
-    return spec.worldbody.add_frame().attach_body(_base(own), f"r{i}/", "")
 
 
 def pose_of(
@@ -393,109 +366,3 @@ def _declared(kind: str, model: MjModel) -> Declarations:
         return declared_by(numerics)
     except ValueError as error:
         raise refused("robot", kind, error) from error
-
-
-def _base(spec: MjSpec) -> MjsBody:
-    """Return the one body that stands in the world."""
-    return spec.worldbody.first_body()
-
-
-def _check(kind: str, spec: MjSpec, model: MjModel) -> None:
-    """Raise ValueError for a model that cannot be one robot of a team."""
-    said = _fault_of_base(spec, model) or _fault_of_parts(model) or _fault_of_sensors(spec, model)
-    if said:
-        raise ValueError(f"robot {kind}: {said}")
-
-
-def _fault_of_base(spec: MjSpec, model: MjModel) -> str:
-    """Return what is wrong with where a model is and how it can move; nothing if it is right."""
-    bases = spec.worldbody.bodies
-    if len(bases) != 1:
-        return f"it has {len(bases)} bodies in the world, but a robot has one, and others within it"
-    if not _has_base(model):
-        return (
-            f"body {bases[0].name or 'without a name'} is neither free nor on a plane; give it "
-            "<freejoint/>, or slides along x and y and then a hinge about z"
-        )
-    if not _is_at_origin(model):
-        return (
-            "a base on a plane must begin at x = y = 0, level and facing x, its joints without pos "
-            "and ref"
-        )
-    return ""
-
-
-def _fault_of_parts(model: MjModel) -> str:
-    """Return what is wrong with what a model has; nothing if it is right."""
-    step_s = model.opt.timestep
-    if model.nu == 0:
-        return "it has no actuator, so nothing could drive it"
-    if not np.any(collides(model)):
-        return "it has no geom that collides, so nothing could stop it; give one contype 1"
-    if not LEAST_STEP_S <= step_s <= MOST_STEP_S:
-        limits = f"from {LEAST_STEP_S:g} to {MOST_STEP_S:g} s"
-        return f"its timestep must be {limits}, not {step_s:g}; give <option timestep/>"
-    if model.opt.gravity.tolist() != [0.0, 0.0, -GRAVITY_MPS2] or np.any(model.opt.wind):
-        return (
-            f"gravity is {GRAVITY_MPS2:g} m/s² here, and wind the mission's; take both out of its "
-            "option"
-        )
-    if model.neq + model.ntendon > 0:
-        return "it has equalities or tendons, which are not supported"
-    return _fault_of_antenna(model)
-
-
-def _fault_of_antenna(model: MjModel) -> str:
-    """Return what is wrong with where the antenna is; nothing if it is right."""
-    x_m, y_m, z_m = _antenna_offset_m(model).tolist()
-    if max(abs(x_m), abs(y_m)) <= OFF_AXIS_M and abs(z_m) <= MOST_ANTENNA_M:
-        return ""
-    return (
-        f"its antenna must be right above or below its base, at most {MOST_ANTENNA_M:g} m away, "
-        f'not at ({x_m:g}, {y_m:g}, {z_m:g}) m from it; give the site pos="0 0 HEIGHT"'
-    )
-
-
-def _antenna_offset_m(model: MjModel) -> Float[np.ndarray, "3"]:
-    """Return the antenna's place from the base, in a robot at rest; 0 without such a site [m]."""
-    site = mj_name2id(model, mjtObj.mjOBJ_SITE, ANTENNA)
-    if site < 0:
-        return np.zeros(3)
-    data = rest_pose(model)
-    return data.site_xpos[site] - data.xpos[1]
-
-
-def _fault_of_sensors(spec: MjSpec, model: MjModel) -> str:
-    """Return what is wrong with a model's sensors; nothing if it is right."""
-    if model.nsensor == 0:
-        return ""
-    scene = MjSpec()
-    own = spec.copy()
-    take_over_settings(scene, own)
-    _attached(scene, own, 0)
-    if scene.compile().nsensordata == model.nsensordata:
-        return ""
-    return (
-        "it has a sensor of what is not in its body, which stays out of the scene; leave that "
-        "sensor out"
-    )
-
-
-def _is_at_origin(model: MjModel) -> bool:
-    """Return whether a planar base has the coordinates that its joints have; a free one may not."""
-    if is_free_base(model):
-        return True
-    is_level = np.allclose(model.body_quat[1], [1.0, 0.0, 0.0, 0.0])
-    is_central = not np.any(model.body_pos[1, :2]) and not np.any(model.jnt_pos[:3])
-    return is_level and is_central and not np.any(model.qpos0[:PLANAR_QPOS])
-
-
-def _has_base(model: MjModel) -> bool:
-    """Return whether the first body, and no other, is on a free joint or a planar base."""
-    slide, hinge = int(mjtJoint.mjJNT_SLIDE), int(mjtJoint.mjJNT_HINGE)
-    of_base = np.flatnonzero(model.jnt_bodyid == 1)
-    kinds = model.jnt_type[of_base].tolist()
-    if kinds == [int(mjtJoint.mjJNT_FREE)]:
-        return True
-    is_planar = kinds == [slide, slide, hinge]
-    return is_planar and bool(np.array_equal(model.jnt_axis[of_base], np.eye(3)))

@@ -13,7 +13,8 @@ import rerun as rr
 from jaxtyping import Float
 from mujoco._structs import MjModel
 
-from swarm_mj.physics.robots import RobotKind, kinds_of, rest_pose
+from swarm_mj.physics.robot_model import rest_pose
+from swarm_mj.physics.robots import RobotKind, kinds_of
 from swarm_mj.replay import layers
 from swarm_mj.replay.layer_kinds import Entity
 from swarm_mj.replay.rerun_log import RerunLog

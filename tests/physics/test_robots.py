@@ -1,6 +1,9 @@
+from functools import partial
+
 import mujoco
 import numpy as np
 import pytest
+from robot_files import BODY, LIFT, SENSORS, mjcf, with_antenna, written
 
 from swarm_mj import paper
 from swarm_mj.physics.pilots import Pilot, QuadrotorPilot, RoverPilot
@@ -16,49 +19,11 @@ from swarm_mj.physics.robots import (
 from swarm_mj.physics.scene import compose
 from swarm_mj.simulation.swarm import Swarm
 
-BODY = '<body name="base"><freejoint/><geom size="0.1" mass="0.2"/><site name="s"/></body>'
-PLANAR = (
-    '<body name="base" pos="0 0 0.1"><joint name="x" type="slide" axis="1 0 0"/>'
-    '<joint name="y" type="slide" axis="0 1 0"/><joint name="h" type="hinge" axis="0 0 1"/>'
-    '<geom size="0.1" mass="0.2"/><site name="s"/></body>'
-)
-LIFT = '<actuator><motor name="lift" site="s" gear="0 0 1 0 0 0"/></actuator>'
-
-FAR = '<sensor><framepos objtype="site" objname="w"/></sensor>'
-APART = (
-    '<sensor><framepos objtype="site" objname="s" reftype="site" refname="w"/>'
-    '<gyro site="s"/></sensor>'
-)
-SENSORS = (
-    '<sensor><gyro name="turns" site="s"/><rangefinder site="s" cutoff="7"/>'
-    '<touch name="bumper" site="s" cutoff="3"/></sensor>'
-)
-
-
-def mjcf(body=BODY, actuator=LIFT, option='<option timestep="0.002"/>'):
-    floor = '<geom type="plane" size="5 5 1"/>'
-    return f"<mujoco>{option}<worldbody>{floor}{body}</worldbody>{actuator}</mujoco>"
-
-
-def with_antenna(place):
-    return BODY.replace('<site name="s"/>', f'<site name="s"/><site name="antenna" pos="{place}"/>')
-
-
-def declaring(name, number):
-    option = '<option timestep="0.002"/>'
-    return f'{option}<custom><numeric name="{name}" data="{number}"/></custom>'
-
 
 @pytest.fixture
 def own(tmp_path):
     """Writes a robot's file; returns its name."""
-
-    def write(text):
-        path = tmp_path / "mine.xml"
-        path.write_text(text)
-        return str(path)
-
-    return write
+    return partial(written, tmp_path)
 
 
 def steady(_sensed, _wanted, control):
@@ -131,37 +96,6 @@ def test_an_own_pilot_for_one_of_two_shipped_kinds_is_refused():
         make_pilots(kinds, 0.005, steady)
     with pytest.raises(TypeError, match="a pilot is called with"):
         make_pilots(kinds[:1], 0.005, lambda _: None)
-
-
-@pytest.mark.parametrize(
-    ("text", "said"),
-    [
-        ("<mujoco><worldbody>", "not well-formed XML"),
-        (mjcf(body=BODY.replace("<freejoint/>", "")), "neither free nor on a plane"),
-        (mjcf(body=BODY.replace("<freejoint/>", '<joint type="ball"/>')), "neither free nor on"),
-        (mjcf(body=BODY + BODY.replace("base", "b2").replace('"s"', '"t"')), "it has 2 bodies"),
-        (mjcf(actuator=""), "it has no actuator"),
-        (mjcf(body=BODY.replace("<geom", '<geom contype="0" conaffinity="0"')), "that collides"),
-        (mjcf(body=PLANAR.replace('pos="0 0 0.1"', 'pos="1 0 0.1"')), "must begin at x = y = 0"),
-        (mjcf(option='<option timestep="0.02"/>'), "its timestep must be from 0.0005 to 0.01 s"),
-        (mjcf(actuator=LIFT.replace('"s"', '"gone"')), "gone"),
-        (mjcf(body=BODY.replace('mass="0.2"', 'mass="nan"')), "nan in mass"),
-        (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + FAR), "sensor of what is not in its"),
-        (mjcf(body='<site name="w"/>' + BODY, actuator=LIFT + APART), "sensor of what is not in"),
-        (mjcf(body=with_antenna("0.1 0 0.3")), r"right above or below its base.*\(0.1, 0, 0.3\) m"),
-        (mjcf(body=with_antenna("0 0 11")), "at most 10 m away"),
-        (mjcf(option='<option gravity="0 0 -1.6"/>'), "gravity is 9.81 m/s² here"),
-        (mjcf(option='<option wind="3 0 0"/>'), "wind the mission's; take both out"),
-        (mjcf(option=declaring("antena_gain", 2)), "did you mean antenna_gain_dbi"),
-        (mjcf(option=declaring("efficiency", 2)), "efficiency must be a number from 0.01 to 1"),
-    ],
-)
-def test_a_file_that_is_no_robot_is_refused_in_a_line(own, text, said):
-    name = own(text)
-    with pytest.raises(ValueError, match=said) as raised:
-        kinds_of(paper(robot=name, num_robots=2))
-    assert str(raised.value).startswith(f"robot {name}: ")
-    assert "\n" not in str(raised.value)
 
 
 @pytest.mark.parametrize(
@@ -265,13 +199,6 @@ def test_antennas_are_as_their_models_declare_robot_by_robot(own):
     np.testing.assert_allclose(antennas.gain, [1.0, 1.0, 10.0])
     np.testing.assert_allclose(antennas.power, [1.0, 1.0, 0.1])
     assert not antennas.are_alike
-
-
-def test_an_antenna_within_another_body_counts_from_the_base(own):
-    mast = '<body pos="0 0 0.5"><geom size="0.1" mass="0.1"/><site name="antenna" pos="0 0 1"/>'
-    body = BODY.replace('<site name="s"/>', f'<site name="s"/>{mast}</body>')
-    [kind] = kinds_of(paper(robot=own(mjcf(body=body)), num_robots=2))
-    assert kind.antenna_m == pytest.approx(1.5)
 
 
 def test_the_rovers_antenna_is_on_its_deck():

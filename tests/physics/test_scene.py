@@ -205,7 +205,7 @@ def test_a_scene_that_changes_how_robots_move_is_refused(part, name):
             # Some are not a number unless they are given.
             setattr(owner[part], name, np.nan_to_num(np.asarray(old, dtype=float)) + 1.0)
         else:
-            setattr(owner[part], name, type(old)(0 if old else 1))  # also of enumerators
+            setattr(owner[part], name, type(old)(0 if int(old) else 1))  # also of enumerators
 
     with pytest.raises(ValueError, match=f"must leave how robots move, but changed {name} of"):
         compose(paper("random-walk", num_robots=3, physics="contact"), scene=meddling)

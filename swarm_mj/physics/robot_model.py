@@ -1,0 +1,56 @@
+"""Questions to the compiled model of one robot, and its way into a scene."""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from mujoco._enums import mjtBias, mjtJoint, mjtObj
+from mujoco._functions import mj_forward, mj_name2id
+from mujoco._specs import MjsBody, MjSpec
+from mujoco._structs import MjData, MjModel
+
+FREE_QPOS = 7  # of a free base: a place and a quaternion
+PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
+ANTENNA = "antenna"  # the site where a model has it
+
+
+def collides(model: MjModel) -> Bool[np.ndarray, "G"]:
+    """Return which geoms are of the robot, not its surroundings, and collide."""
+    has_mask = (model.geom_contype != 0) | (model.geom_conaffinity != 0)
+    return has_mask & (model.geom_bodyid > 0)
+
+
+def is_motor(model: MjModel) -> Bool[np.ndarray, "U"]:
+    """Return which actuators' force is their control times a gain, and nothing else."""
+    return model.actuator_biastype == mjtBias.mjBIAS_NONE
+
+
+def rest_pose(model: MjModel) -> MjData:
+    """Return a robot whose base is level at the origin, or on its plane, all other joints at 0."""
+    data = MjData(model)
+    if is_free_base(model):
+        data.qpos[:FREE_QPOS] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+    mj_forward(model, data)
+    return data
+
+
+def is_free_base(model: MjModel) -> bool:
+    """Return whether a robot's base can move and turn in all directions: it flies."""
+    return int(model.jnt_type[0]) == int(mjtJoint.mjJNT_FREE)
+
+
+def antenna_offset_m(model: MjModel) -> Float[np.ndarray, "3"]:
+    """Return the antenna's place from the base, in a robot at rest; 0 without such a site [m]."""
+    site = mj_name2id(model, mjtObj.mjOBJ_SITE, ANTENNA)
+    if site < 0:
+        return np.zeros(3)
+    data = rest_pose(model)
+    return data.site_xpos[site] - data.xpos[1]
+
+
+def attached(spec: MjSpec, own: MjSpec, i: int) -> MjsBody:
+    """Attach a robot, with what refers to its parts alone, as `r{i}/`; return its base there."""
+    return spec.worldbody.add_frame().attach_body(base_of(own), f"r{i}/", "")
+
+
+def base_of(spec: MjSpec) -> MjsBody:
+    """Return the one body that stands in the world."""
+    return spec.worldbody.first_body()
