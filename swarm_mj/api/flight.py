@@ -16,7 +16,7 @@ import numpy as np
 from rich.console import Console
 
 from swarm_mj.api.flight_summary import FlightSummary
-from swarm_mj.api.flight_table import flight_numbers
+from swarm_mj.api.flight_table import flight_numbers, plain_number
 from swarm_mj.api.run import Run
 from swarm_mj.mission import Mission
 from swarm_mj.mission.bodies import POINT
@@ -146,8 +146,10 @@ def fly_mission(
     numbers["interrupted"] = code != DONE
     numbers["heard_share"] = _heard_share(swarm)
     numbers["strayed"] = _num_strayed(swarm)
-    numbers["crashed"] = _num_crashed(swarm)
-    numbers |= _energy(swarm)
+    states = swarm.states
+    numbers["crashed"] = plain_number(states.num_crashed, is_count=True)
+    numbers["energy_mean_j"] = plain_number(states.mean_energy_j)
+    numbers["energy_worst_j"] = plain_number(states.most_energy_j)
     run = Run(
         mission=mission,
         config=flight.config(),
@@ -248,20 +250,6 @@ def _heard_share(swarm: Swarm) -> float:
         is_known = is_known[is_on][:, is_on]
     own = len(is_known)  # a robot knows itself
     return float((np.sum(is_known) - own) / (is_known.size - own))
-
-
-def _num_crashed(swarm: Swarm) -> int | None:
-    """Return how many robots crashed; None where they are points."""
-    has_crashed = swarm.states.has_crashed
-    return None if has_crashed is None else int(np.sum(has_crashed))
-
-
-def _energy(swarm: Swarm) -> dict[str, float | None]:
-    """Return the robots' energy, mean and most; None where they are points or do not say [J]."""
-    energy_j = swarm.states.energy_j
-    if energy_j is None or np.any(np.isnan(energy_j)):
-        return {"energy_mean_j": None, "energy_worst_j": None}
-    return {"energy_mean_j": float(np.mean(energy_j)), "energy_worst_j": float(np.max(energy_j))}
 
 
 def _num_strayed(swarm: Swarm) -> int:

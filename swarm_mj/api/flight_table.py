@@ -1,10 +1,11 @@
 """The numbers of one flight: for the terminal and for `--json`."""
 
 import math
-from dataclasses import asdict
+from dataclasses import fields
 from typing import Any
 
 import numpy as np
+from jaxtyping import Float
 
 from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
@@ -15,7 +16,7 @@ from swarm_mj.protocol.agreement import AGREED, perfect_rate
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second, where_flown
-from swarm_mj.simulation.rollout import Summary
+from swarm_mj.simulation.rollout import Count, FlownCosts, SomeCount, Summary
 
 CENTRE = "no: a centre knows all positions"
 FATES = {  # rows of the table: a count among the numbers, and its share of the packets sent
@@ -40,8 +41,11 @@ def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[s
         policy is; None is what is not defined.
     """
     numbers: dict[str, Any] = {}
-    for name, value in asdict(summary).items():
-        numbers[name] = _number(name, value)
+    for spec in fields(FlownCosts):
+        value = getattr(summary, spec.name)
+        if isinstance(value, np.ndarray):
+            value = plain_number(value, is_count=spec.type in (Count, SomeCount))
+        numbers[spec.name] = value
     first = numbers["velocity_variance_first"]
     last = numbers["velocity_variance_last"]
     packet_bytes = policy.packet(mission).num_bytes
@@ -108,13 +112,11 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     return rows
 
 
-def _number(name: str, value: str | int | np.ndarray | None) -> str | int | float | None:
-    """Return a field for the one mission: counts whole, None where it is not defined."""
-    if value is None or isinstance(value, str | int):
-        return value
-    if math.isnan(number := float(value[0])):
+def plain_number(value: Float[np.ndarray, "1"], *, is_count: bool = False) -> int | float | None:
+    """Return the number of the one mission, whole if it counts; None where it is not defined."""
+    number = float(value[0])
+    if math.isnan(number):
         return None
-    is_count = name.startswith("packets_") or name.endswith("_window")
     return int(number) if is_count else number
 
 

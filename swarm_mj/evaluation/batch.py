@@ -10,6 +10,7 @@ from jaxtyping import Bool, Float, Int
 from swarm_mj.evaluation.ages import connectivity_floor, count_ages
 from swarm_mj.mission import Mission
 from swarm_mj.mission.geometry import count_strayed
+from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.policies.policy_arguments import USUAL, PolicyArguments
 from swarm_mj.policies.registry import make_policy_with
@@ -47,10 +48,8 @@ class Moment:
     packets: Packets  # the window's, taken once for all columns that count them
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     now: Float[np.ndarray, "B"]  # t [windows]
-    is_active: Bool[np.ndarray, "B N"]
-    has_crashed: Bool[np.ndarray, "B N"] | None  # None: robots are points
-    energy_j: Float[np.ndarray, "B N"] | None  # that each has used so far [J]; likewise
-    position_m: Float[np.ndarray, "B N D"]
+    is_active: Bool[np.ndarray, "B N"]  # as of the states, and an array also if all are
+    states: RobotStates
     range_m: float  # of a packet in silence
     is_steady: bool  # whether the window is of the second half
     is_last: bool  # whether it is the mission's last
@@ -77,28 +76,7 @@ class Moment:
         """How many robots are out of everyone's range at the mission's end; nan before."""
         if not self.is_last:  # distances of all pairs take as long as a window
             return np.full(len(self.now), np.nan)
-        return count_strayed(self.position_m, self.range_m, self.is_active)
-
-    @property
-    def crashed(self) -> Float[np.ndarray, "B"]:
-        """How many robots have crashed; nan where they are points."""
-        if self.has_crashed is None:
-            return np.full(len(self.now), np.nan)
-        return np.sum(self.has_crashed, axis=1).astype(float)
-
-    @property
-    def energy_per_robot_j(self) -> Float[np.ndarray, "B"]:
-        """The energy that robots have used on average [J]; nan where that is not known."""
-        if self.energy_j is None:
-            return np.full(len(self.now), np.nan)
-        return np.mean(self.energy_j, axis=1)
-
-    @property
-    def most_energy_j(self) -> Float[np.ndarray, "B"]:
-        """The energy of the robot that has used most [J]; nan where that is not known."""
-        if self.energy_j is None:
-            return np.full(len(self.now), np.nan)
-        return np.max(self.energy_j, axis=1)
+        return count_strayed(self.states.position_m, self.range_m, self.is_active)
 
 
 Value = TypeVar("Value")  # one number a mission
@@ -188,11 +166,11 @@ class BatchCosts:
     # Robots out of everyone's range at the end.
     strayed: Float[np.ndarray, "B"] = _last(lambda at: at.strayed)
     # Robots with bodies that crashed; nan: they are points.
-    crashed: Float[np.ndarray, "B"] = _last(lambda at: at.crashed)
+    crashed: Float[np.ndarray, "B"] = _last(lambda at: at.states.num_crashed)
     # Energy of a robot with a body in the whole mission [J]; nan: not known, or they are points.
-    energy_j: Float[np.ndarray, "B"] = _last(lambda at: at.energy_per_robot_j)
+    energy_j: Float[np.ndarray, "B"] = _last(lambda at: at.states.mean_energy_j)
     # As above, of the robot that used most.
-    most_energy_j: Float[np.ndarray, "B"] = _last(lambda at: at.most_energy_j)
+    most_energy_j: Float[np.ndarray, "B"] = _last(lambda at: at.states.most_energy_j)
     # Requests or broadcasts.
     packets_sent: Float[np.ndarray, "B"] = _total(lambda at: at.packets.sent)
     # All that were on the air, responses too.
@@ -290,9 +268,7 @@ def _moments(swarm: Swarm, flown: Iterable[WindowRecord]) -> Iterator[Moment]:
             timestamp=swarm.buffers.timestamp,
             now=now,
             is_active=is_active,
-            has_crashed=states.has_crashed,
-            energy_j=states.energy_j,
-            position_m=states.position_m,
+            states=states,
             range_m=mission.range_m,
             is_steady=bool(now[0] > num_early),
             is_last=bool(now[0] >= mission.num_windows),

@@ -43,6 +43,27 @@ class RobotStates:
         """Where each robot observes itself to be: exactly at p unless it errs [m]."""
         return self.position_m if self.observed_m is None else self.observed_m
 
+    @property
+    def num_crashed(self) -> Float[np.ndarray, "B"]:
+        """How many robots have crashed; nan where they are points."""
+        if self.has_crashed is None:
+            return np.full(len(self.position_m), np.nan)
+        return np.sum(self.has_crashed, axis=1).astype(float)
+
+    @property
+    def mean_energy_j(self) -> Float[np.ndarray, "B"]:
+        """The energy that robots have used on average [J]; nan where that is not known."""
+        if self.energy_j is None:
+            return np.full(len(self.position_m), np.nan)
+        return np.mean(self.energy_j, axis=1)
+
+    @property
+    def most_energy_j(self) -> Float[np.ndarray, "B"]:
+        """The energy of the robot that has used most [J]; nan where that is not known."""
+        if self.energy_j is None:
+            return np.full(len(self.position_m), np.nan)
+        return np.max(self.energy_j, axis=1)
+
 
 class Antennas(NamedTuple):
     """The antennas of robots with bodies, in the order of their numbers; gains are linear."""
