@@ -111,11 +111,11 @@ def addressed(mission: Mission, policy: str, seeds: Sequence[int], bar: WorkBar)
     everyone = np.arange(mission.num_robots)
     position_m = swarm.states.position_m  # they rest
     apart = np.linalg.norm(position_m[:, :, None] - position_m[:, None], axis=3) / mission.range_m
-    teammates = np.stack([apart, apart < NEAR, np.zeros_like(apart)], axis=3)
+    is_near = apart < NEAR
     chosen: list[list[Teammate]] = [[] for _ in seeds]
     drawn: list[list[Teammate]] = [[] for _ in seeds]
     for _ in range(mission.num_windows):
-        teammates[..., Teammate._fields.index("on_route")] = on_route(swarm.buffers.parent)
+        is_routed = on_route(swarm.buffers.parent)
         can_address = swarm.buffers.is_known & (apart <= ADDRESS_RANGES)
         can_address[:, everyone, everyone] = False
         swarm.step()
@@ -123,8 +123,13 @@ def addressed(mission: Mission, policy: str, seeds: Sequence[int], bar: WorkBar)
         for b, i in np.argwhere(recipient != everyone).tolist():
             j = recipient[b, i]
             if can_address[b, i, j]:  # else it knows nothing of j yet
-                chosen[b].append(Teammate(*teammates[b, i, j].tolist()))
-                drawn[b].append(_mean(teammates[b, i, can_address[b, i]]))
+                for known, who in ((chosen, j), (drawn, can_address[b, i])):
+                    teammate = Teammate(
+                        apart_ranges=float(np.mean(apart[b, i, who])),
+                        near=float(np.mean(is_near[b, i, who])),
+                        on_route=float(np.mean(is_routed[b, i, who])),
+                    )
+                    known[b].append(teammate)
         bar.advance(len(seeds))
     found: list[Addressed] = []
     for its_chosen, its_drawn in zip(chosen, drawn, strict=True):

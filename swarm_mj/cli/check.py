@@ -18,7 +18,7 @@ from swarm_mj.cli.mission_options import (
 )
 from swarm_mj.cli.options import common_output, nested, output_option
 from swarm_mj.evaluation.convergence import Convergence, Goal, Verdict, converging
-from swarm_mj.evaluation.engines import GROUP, EngineOptions
+from swarm_mj.evaluation.engines import PROCESSES, EngineOptions
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.evaluation.study import Study
 from swarm_mj.evaluation.study_needs import study_needs
@@ -61,7 +61,7 @@ class CheckOptions(EngineOptions, PolicyOptions):
         high=256,
         shown=f"one a core, {MOST_JOBS} at most",
         is_common=True,
-        group=GROUP,
+        group=PROCESSES,
     )
     json: Path | None = common_output(None, "write the verdict and each mission's numbers")
     plot: Path | None = common_output(

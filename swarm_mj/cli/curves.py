@@ -11,7 +11,7 @@ import numpy as np
 from swarm_mj.cli.mission_options import mission_flags
 from swarm_mj.cli.options import flags_of
 from swarm_mj.cli.train_report import difference
-from swarm_mj.cli.train_settings import SPECS
+from swarm_mj.cli.train_settings import SPECS_BY_PLACE
 from swarm_mj.evaluation.figures import quiet_matplotlib
 from swarm_mj.learning.run_folder import (
     CURVE,
@@ -144,7 +144,7 @@ def _comparisons(runs: Sequence[Learned]) -> Iterator[str]:
 def _options_that_differ(runs: Sequence[Learned]) -> dict[str, list[str]]:
     """Return each run's values of the options that differ between runs, by the options' names."""
     found: dict[str, list[str]] = {}
-    for place, spec in SPECS.items():
+    for place, spec in SPECS_BY_PLACE.items():
         if not place.startswith("mission."):  # which are the same
             name = flags_of(spec)[0].removeprefix("--")
             found[name] = [as_typed(attrgetter(place)(each.asked.training)) for each in runs]

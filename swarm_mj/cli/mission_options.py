@@ -14,7 +14,7 @@ from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
-from swarm_mj.simulation.components import GROUP, SHOWN_AS, Components
+from swarm_mj.simulation.components import OWN_PARTS, SHOWN_AS, Components
 from swarm_mj.system.fields import Meaning, as_typed, kind_of, meaning_of, setting
 from swarm_mj.system.user_code import files_named
 
@@ -54,7 +54,7 @@ class PolicyOptions(Components):
     features: tuple[str, ...] = setting(
         (),
         "own features of a trained policy (its file holds only the name)",
-        group=GROUP,
+        group=OWN_PARTS,
         metavar=SHOWN_AS,
         reads=files_named,
     )
@@ -62,7 +62,7 @@ class PolicyOptions(Components):
         (),
         "that a learned policy decides by, if it is someone's own; give it again",
         flag="--network",
-        group=GROUP,
+        group=OWN_PARTS,
         metavar=SHOWN_AS,
         reads=files_named,
     )

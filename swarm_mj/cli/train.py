@@ -15,7 +15,7 @@ from swarm_mj.cli.mission_options import mission_flags, values_of
 from swarm_mj.cli.options import Given, nested
 from swarm_mj.cli.train_report import Watch, has_stopped_early, report, verdicts
 from swarm_mj.cli.train_sweep import run_sweep
-from swarm_mj.evaluation.engines import GROUP, EngineOptions
+from swarm_mj.evaluation.engines import PROCESSES, EngineOptions
 from swarm_mj.learning import run_folder
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.selection import Progress
@@ -75,7 +75,7 @@ class TrainOptions(EngineOptions):
         "a training for each combination of values in a file, all below OUT",
         metavar="FILE.toml",
         reads=the_file,
-        group=GROUP,
+        group=PROCESSES,
     )
     yes: bool = setting(False, YES)
     settings: Given = nested(train_settings.setting_options, train_settings.given_settings)

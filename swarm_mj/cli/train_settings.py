@@ -40,7 +40,7 @@ from swarm_mj.policies.index.policy import IndexCsma
 from swarm_mj.policies.index.weights import START
 from swarm_mj.policies.policy_config import GnnConfig, GnnShape
 from swarm_mj.protocol.packets import check_whole
-from swarm_mj.simulation.components import GROUP, Components
+from swarm_mj.simulation.components import OWN_PARTS, Components
 from swarm_mj.system.fields import as_typed, meaning_of
 from swarm_mj.system.user_code import is_own
 
@@ -48,7 +48,7 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
     "": (Training, "run"),
     "network.": (GnnShape, "network"),
     "ppo.": (PpoSettings, "PPO"),
-    "components.": (Components, GROUP),
+    "components.": (Components, OWN_PARTS),
     "mission.": (
         Mission,
         "missions, trained on together for several values (not of --windows)",
@@ -71,12 +71,12 @@ def _specs() -> dict[str, Field[Any]]:
     return specs
 
 
-SPECS = _specs()
+SPECS_BY_PLACE = _specs()
 
 
 def setting_options() -> Iterator[Option]:
     """Yield the settings as options, under a heading for each part of the settings."""
-    for place, spec in SPECS.items():
+    for place, spec in SPECS_BY_PLACE.items():
         _, heading = PARTS[place.removesuffix(spec.name)]
         about = about_option(spec) if place.startswith("mission.") else meaning_of(spec)
         about = replace(about, group=heading, shown=_usual(place))
@@ -88,7 +88,7 @@ def setting_options() -> Iterator[Option]:
 def given_settings(given: Given) -> Given:
     """Return the settings that were given, by their places; a value of several counts once."""
     settings = {}
-    for place in SPECS:
+    for place in SPECS_BY_PLACE:
         if place not in given:
             continue
         value = given[place]
@@ -176,7 +176,7 @@ def check_of_index(given: Given) -> None:
     for place in given:
         owner, _, name = place.rpartition(".")
         if not (owner in ("mission", "components") or (name in OF_INDEX and not owner)):
-            flag = flags_of(SPECS[place])[0]
+            flag = flags_of(SPECS_BY_PLACE[place])[0]
             raise ValueError(f"{flag} is of training a gnn, not of index-csma; leave it out")
 
 
@@ -257,7 +257,7 @@ def refuse_others(given: Given, training: Training, whose: str) -> None:
         if owner == "mission" and isinstance(value, tuple):
             stored = values_of(name, training.all_missions)
         if value != stored:
-            typed = f"{flags_of(SPECS[place])[0]} {as_typed(value)}"
+            typed = f"{flags_of(SPECS_BY_PLACE[place])[0]} {as_typed(value)}"
             raise ValueError(f"{typed} is not what {whose} has, {as_typed(stored)}; leave it out")
 
 
@@ -289,7 +289,7 @@ def _num_groups(missions: int, num_kinds: int) -> int:
 
 def _usual(place: str) -> str:
     """Return the default as text: per robot and, where it differs, per team."""
-    own = meaning_of(SPECS[place]).shown
+    own = meaning_of(SPECS_BY_PLACE[place]).shown
     if own is not None:
         return own
     robot = _usual_of("robot", place)

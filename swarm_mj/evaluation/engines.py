@@ -41,7 +41,7 @@ SURROUNDINGS = {f"{library}_NUM_THREADS": "1" for library in ("OMP", "OPENBLAS",
 SURROUNDINGS |= {"MUJOCO_GL": "disable", SAFE_PATH: "1"}
 # Ray sends nothing to its makers, and does not warn of GPUs.
 QUIET = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_ACCEL_ENV_VAR_OVERRIDE_ON_ZERO": "0"}
-GROUP = "processes that fly missions"  # the options' heading
+PROCESSES = "processes that fly missions"  # the options' heading
 MAX_ARRAY = 1000  # SLURM's usual limit of jobs in an array
 ATTEMPTS = 3  # how often a job is submitted
 JOB_NAME = "swarm-mj"  # as `squeue` shows it
@@ -270,11 +270,13 @@ def _copy_parts(folder: str, files: Sequence[Path]) -> None:
 class EngineOptions:
     """Who flies a study's missions."""
 
-    jobs: int = setting(1, "how many at once", low=1, high=256, is_common=True, group=GROUP)
+    jobs: int = setting(1, "how many at once", low=1, high=256, is_common=True, group=PROCESSES)
     engine: str = setting(
-        "local", "who starts them", choices=("local", "ray", "slurm"), group=GROUP
+        "local", "who starts them", choices=("local", "ray", "slurm"), group=PROCESSES
     )
-    address: str | None = setting(None, "a running Ray's", metavar="auto|HOST:PORT", group=GROUP)
+    address: str | None = setting(
+        None, "a running Ray's", metavar="auto|HOST:PORT", group=PROCESSES
+    )
 
     @property
     def jobs_here(self) -> int:

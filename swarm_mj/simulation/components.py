@@ -18,9 +18,9 @@ from swarm_mj.system.arguments import check_component, name_of
 from swarm_mj.system.fields import setting
 from swarm_mj.system.user_code import call, file_of, files_named, make
 
-GROUP = "your own parts, each by module:Name"
+OWN_PARTS = "your own parts, each by module:Name"
 SHOWN_AS = "MODULE:NAME"
-OWN = {"group": GROUP, "metavar": SHOWN_AS, "convert": str}
+OWN = {"group": OWN_PARTS, "metavar": SHOWN_AS, "convert": str}
 CALLED_WITH = {  # the kinds of components, and the arguments of each
     "channel": ("position_m", "recipient"),
     "controller": ("buffers", "states"),
