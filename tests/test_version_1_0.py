@@ -8,6 +8,7 @@ import importlib
 import inspect
 import json
 import shutil
+import sys
 import tarfile
 from pathlib import Path
 
@@ -101,7 +102,8 @@ def files(unpacked, tmp_path, monkeypatch):
     folder = shutil.copytree(unpacked, tmp_path / "v1.0")
     monkeypatch.chdir(folder)
     monkeypatch.syspath_prepend(folder)
-    return folder
+    yield folder
+    sys.modules.pop("own_parts", None)  # or it would be that of tests to come
 
 
 @pytest.fixture

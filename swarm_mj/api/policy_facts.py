@@ -1,4 +1,4 @@
-"""What a policy says of itself, as plain values: for lists on terminals, in JSON and on pages."""
+"""Policies' words on themselves, as plain values: for lists on terminals, in JSON and on pages."""
 
 import inspect
 from typing import Any

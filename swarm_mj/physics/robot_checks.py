@@ -1,4 +1,4 @@
-"""What a model must be to be one robot of a team, each rule with its message."""
+"""The rules that a model must keep to be one robot of a team, each with its message."""
 
 import numpy as np
 from mujoco._enums import mjtJoint

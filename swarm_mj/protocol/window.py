@@ -74,12 +74,12 @@ class LocalViews:
 
     @property
     def last_recipient(self) -> Int[np.ndarray, "B N"]:
-        """Whom each robot addressed in the last slot; itself: it was silent."""
+        """The recipient of each robot in the last slot; itself: it was silent."""
         return self.phases[-1].recipient if self.phases else self.silence
 
     @property
     def last_heard(self) -> Int[np.ndarray, "B N"]:
-        """Whom each robot decoded in the last slot; itself: nobody."""
+        """The sender that each robot decoded in the last slot; itself: nobody."""
         return self.phases[-1].heard if self.phases else self.silence
 
 

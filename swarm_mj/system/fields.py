@@ -52,7 +52,7 @@ class Switch:
 
     @property
     def needed(self) -> str:
-        """What the other field must be, in words."""
+        """The state that the other field needs, in words."""
         if not self.state:
             return "above 0"
         return f"other than {self.state}" if self.is_other else self.state

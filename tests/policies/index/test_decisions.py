@@ -45,7 +45,7 @@ def decisions(
     gain.total[0] = gains
     gain.largest[0] = gains
     gain.neighbours[:] = 1.0
-    minislot, shift_db = np.empty((1, 2)), np.empty((1, 2))
+    share, shift_db = np.empty((1, 2)), np.empty((1, 2))
     has_sent = np.zeros((1, 2), bool)
     has_sent[0, list(sent)] = True
     decide(
@@ -57,12 +57,13 @@ def decisions(
         has_sent=has_sent,
         has_decoded=np.array([[True, False]]),
         covered=np.array([[0.5, 0.0]]),
-        drawn=np.array([[[draw, draw], [chance, chance]]]),
+        begin_draw=np.array([[draw, draw]]),
+        silence_draw=np.array([[chance, chance]]),
         phase=phase,
-        minislot=minislot,
+        share=share,
         shift_db=shift_db,
     )
-    return minislot[0], shift_db[0], record
+    return share[0], shift_db[0], record
 
 
 def test_an_octave_more_gain_begins_an_octave_earlier_and_draws_add_to_it():
