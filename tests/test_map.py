@@ -169,7 +169,11 @@ def names_of_aliases(node):
 
 def is_type_variable(value):
     """Whether a value is made by `TypeVar`, whose names are local to their modules."""
-    return isinstance(value, ast.Call) and isinstance(value.func, ast.Name)
+    return (
+        isinstance(value, ast.Call)
+        and isinstance(value.func, ast.Name)
+        and value.func.id == "TypeVar"
+    )
 
 
 def test_public_classes_have_different_names_and_no_alias_has_one_of_them():

@@ -54,7 +54,8 @@ def table(spec: dict[str, Any], folder: Path) -> str:
     """
     unknown = spec.keys() - set(OF_TABLES)
     if unknown:
-        raise ValueError(f"a table has no {', '.join(sorted(unknown))}; it has {OF_TABLES}")
+        known = ", ".join(OF_TABLES)
+        raise ValueError(f"a table has no {', '.join(sorted(unknown))}; it has {known}")
     if function := spec.get("function"):
         return _made(function, _sources(spec), folder)
     columns = _listed(spec["columns"])

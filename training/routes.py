@@ -123,13 +123,10 @@ def addressed(mission: Mission, policy: str, seeds: Sequence[int], bar: WorkBar)
         for b, i in np.argwhere(recipient != everyone).tolist():
             j = recipient[b, i]
             if can_address[b, i, j]:  # else it knows nothing of j yet
-                for known, who in ((chosen, j), (drawn, can_address[b, i])):
-                    teammate = Teammate(
-                        apart_ranges=float(np.mean(apart[b, i, who])),
-                        near=float(np.mean(is_near[b, i, who])),
-                        on_route=float(np.mean(is_routed[b, i, who])),
-                    )
-                    known[b].append(teammate)
+                whom = everyone == j
+                chosen[b].append(_teammate(apart[b, i], is_near[b, i], is_routed[b, i], whom))
+                whom = can_address[b, i]
+                drawn[b].append(_teammate(apart[b, i], is_near[b, i], is_routed[b, i], whom))
         bar.advance(len(seeds))
     found: list[Addressed] = []
     for its_chosen, its_drawn in zip(chosen, drawn, strict=True):
@@ -142,6 +139,20 @@ def addressed(mission: Mission, policy: str, seeds: Sequence[int], bar: WorkBar)
                 )
             )
     return found
+
+
+def _teammate(
+    apart: Float[np.ndarray, "N"],
+    is_near: Bool[np.ndarray, "N"],
+    is_routed: Bool[np.ndarray, "N"],
+    whom: Bool[np.ndarray, "N"],
+) -> Teammate:
+    """Return the mean over those teammates of a robot that are meant."""
+    return Teammate(
+        apart_ranges=float(np.mean(apart[whom])),
+        near=float(np.mean(is_near[whom])),
+        on_route=float(np.mean(is_routed[whom])),
+    )
 
 
 def _mean(teammates: Float[np.ndarray, "M 3"]) -> Teammate:

@@ -155,7 +155,7 @@ def mission_of(
 
 
 def names_of(given: str | Iterable[str]) -> tuple[str, ...]:
-    """Return names of which one may be given by itself."""
+    """Return the names as a tuple; a text by itself is one name."""
     return (given,) if isinstance(given, str) else tuple(given)
 
 

@@ -20,7 +20,6 @@ if TYPE_CHECKING:  # rerun is slow to import
     from swarm_mj.replay.live import LiveReplay
 
 WHERE = (view.WINDOW, view.WEB)
-ANYHOW = "do without one: leave out "  # what was given
 AS_FAST_AS_IT_GOES = "max"
 _kept_open = ExitStack()  # viewers of flights from Python, which stay when `fly` returns
 atexit.register(_kept_open.close)
@@ -56,15 +55,15 @@ def check_live(where: str | None, speed: float | None, *, given: str = "--live")
     """Raise ValueError or ModuleNotFoundError if nothing can be shown so.
 
     Args:
-        where: A way to show it; None: it was not asked for.
-        speed: That was asked for; None is none.
+        where: How to show it; None if no live replay was asked for.
+        speed: The speed asked for; None if there was none.
         given: What asked for it, and may be left out.
     """
     if where is None:
         if speed is not None:
             raise ValueError(f"--speed {speed:g} is of live flights; add --live")
         return
-    need("rerun", "a live replay", ANYHOW + given)
+    need("rerun", "a live replay", f"do without one: leave out {given}")
     view.check_live(where)
 
 

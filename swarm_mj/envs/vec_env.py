@@ -178,7 +178,7 @@ class SwarmVecEnv(BatchVecEnv):
     ) -> list[Any]:
         """Call `action_masks`, the one method of environments; raises AttributeError for others."""
         if method_name != "action_masks":
-            raise AttributeError(f"no environment has its own {method_name}")
+            return super().env_method(method_name, indices=indices)
         masks = self.action_masks()
         return [masks[env] for env in self._get_indices(indices)]
 

@@ -48,7 +48,7 @@ class Moment:
     packets: Packets  # the window's, taken once for all columns that count them
     timestamp: Float[np.ndarray, "B N N"]  # T^{i,j} [windows]
     now: Float[np.ndarray, "B"]  # t [windows]
-    is_active: Bool[np.ndarray, "B N"]  # as of the states, and an array also if all are
+    is_active: Bool[np.ndarray, "B N"]  # as in `states`, but never None
     states: RobotStates
     range_m: float  # of a packet in silence
     is_steady: bool  # whether the window is of the second half

@@ -1,10 +1,7 @@
 """Robots with bodies: B worlds of MuJoCo models, each steered by its pilot, one window a call.
 
-The paper's equation gives no body its velocity, but the set point of its pilot: the acceleration,
-clipped to A_max, moves the set point, clipped to V_max per axis. At the edge of the area
-the set point is mirrored, so bodies turn there as well as they can. While the set point is 0 in the
-plane, its body holds its place there. A body that flies and touches anything has crashed: its
-rotors idle, and its radio is off.
+The paper's equation gives no body its velocity, but the set point of its pilot, see `set_points`. A
+body that flies and touches anything has crashed: its rotors idle, and its radio is off.
 """
 
 from collections.abc import Sequence
@@ -20,7 +17,7 @@ from mujoco._structs import MjModel
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.faults import MIN_SURVIVORS
-from swarm_mj.mission.geometry import PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.physics.energy import Motors, motors_of, use_energy
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import GRAVITY_MPS2, Pilot, Sensed, SetPoint
@@ -143,7 +140,6 @@ class BodyWorlds:
         found = []
         for kind, pilot in zip(kinds, pilots, strict=True):
             model = kind.model
-            pushes = kind.pushes
             qpos = part("qpos", kind, model.nq)
             qvel = part("qvel", kind, model.nv)
             sensors = part("sensordata", kind, model.nsensordata)
@@ -166,9 +162,12 @@ class BodyWorlds:
                 has_crashed=self._has_crashed[:, robots],
                 energy_j=self._energy_j[:, robots],
                 motors=motors_of(
-                    np.linalg.norm(pushes, axis=1), kind.declared, self._step_s, AIR_DENSITY
+                    np.linalg.norm(kind.thrust_axes, axis=1),
+                    kind.declared,
+                    self._step_s,
+                    AIR_DENSITY,
                 ),
-                thrust_per_n=pushes / (kind.mass_kg * GRAVITY_MPS2),
+                thrust_per_n=kind.thrust_axes / (kind.mass_kg * GRAVITY_MPS2),
                 is_trusted=is_ours(pilot),
                 free=_free_states(qpos, qvel, sensors) if kind.is_free else None,
             )
@@ -222,9 +221,9 @@ class BodyWorlds:
         bodies = slice(1, 1 + len(of_body))
         mass_kg[:, bodies] = model.body_mass[bodies] * heavier[:, of_body]
         inertia_kgm2[:, bodies] = model.body_inertia[bodies] * heavier[:, of_body, None]
-        motors = is_motor(model)  # whose gain is their force
-        own_gain = model.actuator_gainprm[motors]
-        gain[:, motors] = own_gain * stronger[:, of_actuator[motors], None]
+        drives = is_motor(model)  # whose gain is their force
+        own_gain = model.actuator_gainprm[drives]
+        gain[:, drives] = own_gain * stronger[:, of_actuator[drives], None]
         self._batch.set_const()
 
     def _owners(self, numbers: Sequence[int]) -> Int[np.ndarray, "K"]:
@@ -242,7 +241,7 @@ class BodyWorlds:
         self._course_mps[:] = velocity_mps
         self._wanted_mps[:] = velocity_mps
         self._place_m[:] = position_m[..., :PLANE]
-        self._height_m[:] = position_m[..., 2]
+        self._height_m[:] = position_m[..., HEIGHT]
         self._has_crashed[:] = False
         self._works = None
         self.states = replace(self.states, is_active=None)
@@ -461,7 +460,7 @@ def _sensed(flown: _Flown) -> Sensed:
     attitude = np.zeros((*shape, 4))
     turn_rate_rps = np.zeros((*shape, 3))
     position_m[..., :2] = qpos[..., :2]
-    position_m[..., 2] = flown.kind.base_m
+    position_m[..., HEIGHT] = flown.kind.base_m
     velocity_mps[..., :2] = qvel[..., :2]
     half = 0.5 * qpos[..., 2]
     attitude[..., 0] = np.cos(half)

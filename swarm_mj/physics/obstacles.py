@@ -10,6 +10,7 @@ from mujoco._functions import mj_kinematics
 from mujoco._structs import MjData, MjModel
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import HEIGHT
 from swarm_mj.physics.materials import DEFAULT_LOSS_DB, MATERIALS
 from swarm_mj.physics.state import BOX, KINDS, ROBOT_HEIGHT_M, ROBOT_RADIUS_M, Obstacles
 from swarm_mj.system.decibels import from_db
@@ -72,7 +73,7 @@ def idle_obstacles(model: MjModel, mission: Mission) -> dict[str, str]:
         if np.any(off_m[:2] > reach_m):
             idle[name] = f"outside the area of {2 * reach_m:.0f} m by {2 * reach_m:.0f} m"
         elif off_m[2] > ROBOT_RADIUS_M and not mission.has_bodies:
-            side = "above" if found.centre_m[o, 2] > ROBOT_HEIGHT_M else "below"
+            side = "above" if found.centre_m[o, HEIGHT] > ROBOT_HEIGHT_M else "below"
             idle[name] = f"{side} the robots, which are {ROBOT_HEIGHT_M:g} m above the floor"
     return idle
 

@@ -21,6 +21,7 @@ from typing import NamedTuple, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Float
 
+from swarm_mj.mission.geometry import HEIGHT
 from swarm_mj.system.compiled import compiled
 
 GRAVITY_MPS2 = 9.81
@@ -202,8 +203,8 @@ def _steer_quadrotors(
             # The acceleration that is wanted, gravity made up for.
             x = _VELOCITY_GAIN * (wanted_mps[b, i, 0] - velocity_mps[b, i, 0])
             y = _VELOCITY_GAIN * (wanted_mps[b, i, 1] - velocity_mps[b, i, 1])
-            climb = _HEIGHT_GAIN * (height_m[b, i] - position_m[b, i, 2])
-            climb += _CLIMB_GAIN * (wanted_mps[b, i, 2] - velocity_mps[b, i, 2])
+            climb = _HEIGHT_GAIN * (height_m[b, i] - position_m[b, i, HEIGHT])
+            climb += _CLIMB_GAIN * (wanted_mps[b, i, HEIGHT] - velocity_mps[b, i, HEIGHT])
             z = max(GRAVITY_MPS2 + climb, least_lift * GRAVITY_MPS2)
             flat = math.sqrt(x * x + y * y)
             if flat > most_tilt * z:

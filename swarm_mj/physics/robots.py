@@ -118,8 +118,8 @@ class RobotKind:
         return np.repeat(limit, model.sensor_dim)
 
     @property
-    def pushes(self) -> Float[np.ndarray, "U 3"]:
-        """How each motor pushes the base, in its axes, by its force before gears."""
+    def thrust_axes(self) -> Float[np.ndarray, "U 3"]:
+        """Each motor's thrust on the base, in its axes, by its force before gears [1]."""
         return self._effects()[:, :3]
 
     @property

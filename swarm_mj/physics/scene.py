@@ -315,11 +315,11 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
 
 def _motion(spec: MjSpec) -> dict[str, str]:
     """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
-    numbers = [OF_JOINTS] * len(spec.joints) + [OF_ACTUATORS] * len(spec.actuators) + [OF_OPTIONS]
+    named = [OF_JOINTS] * len(spec.joints) + [OF_ACTUATORS] * len(spec.actuators) + [OF_OPTIONS]
     parts = [*spec.joints, *spec.actuators, spec.option]
     owners = [*_moving_parts(spec), "option"]
     motion: dict[str, str] = {}
-    for owner, part, names in zip(owners, parts, numbers, strict=True):
+    for owner, part, names in zip(owners, parts, named, strict=True):
         for name in names:
             value = getattr(part, name)
             motion[f"{name} of {owner}"] = str(np.asarray(value).tolist())  # nan is nan there

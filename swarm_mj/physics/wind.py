@@ -26,6 +26,7 @@ class Wind:
         self._wind_mps = wind_mps
         self._kept = np.exp(-mission.window_s / mission.gust_s)  # of a gust, a window later
         self._gusts: Stream | None = None
+        self._gust_mps = np.zeros((len(wind_mps), PLANE))
 
     def start(self, rngs: Sequence[np.random.Generator]) -> None:
         """Draw the first gusts, and blow."""

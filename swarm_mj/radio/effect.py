@@ -56,5 +56,5 @@ class MissionEffect(Effect):
 
 
 def titled(mission: Mission, *names: str) -> str:
-    """Return numbers of a mission with their names, as a title has them."""
+    """Return fields of a mission with their values, as a title has them."""
     return ", ".join(f"{name} {as_typed(getattr(mission, name))}" for name in names)

@@ -11,7 +11,7 @@ import math
 import numpy as np
 from jaxtyping import Bool, Float
 
-from swarm_mj.mission.geometry import PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.physics.state import BOX, CYLINDER, ELLIPSOID, SPHERE, Obstacles
 from swarm_mj.system.compiled import compiled
 
@@ -38,10 +38,10 @@ def obstruct(
     x = position_m[i, 0]
     y = position_m[i, 1]
     has_heights = position_m.shape[1] > PLANE
-    z = position_m[i, 2] if has_heights else height_m
+    z = position_m[i, HEIGHT] if has_heights else height_m
     for j in range(position_m.shape[0]):
         if j != i:
-            climb_m = position_m[j, 2] - z if has_heights else 0.0
+            climb_m = position_m[j, HEIGHT] - z if has_heights else 0.0
             along_m = (position_m[j, 0] - x, position_m[j, 1] - y, climb_m)
             power[j] *= power_through((x, y, z), along_m, obstacles)
 
@@ -89,7 +89,7 @@ def _next_crossed(start_m: Vector, along_m: Vector, first: int, obstacles: Obsta
     for o in range(first, num_obstacles):
         x = obstacles.centre_m[o, 0] - start_x
         y = obstacles.centre_m[o, 1] - start_y
-        z = obstacles.centre_m[o, 2] - start_z
+        z = obstacles.centre_m[o, HEIGHT] - start_z
         share = min(max((x * along_x + y * along_y + z * along_z) * per_m2, 0.0), 1.0)
         x -= share * along_x
         y -= share * along_y

@@ -12,7 +12,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.physics.state import ROBOT_HEIGHT_M
 from swarm_mj.replay import links as compared
 from swarm_mj.replay import palette
-from swarm_mj.replay.links import LinkMismatch, LinkRows, PacketPaths, Positions, Segments
+from swarm_mj.replay.links import LinkLines, LinkMismatch, LinkRows, PacketPaths, Positions
 from swarm_mj.replay.palette import Fate
 from swarm_mj.simulation.components import components_in
 
@@ -220,7 +220,7 @@ class Footage:
 
     def mismatch_lines(
         self, row: int, base_m: float = 0.0
-    ) -> tuple[Segments, UInt8[np.ndarray, "S 3"]]:
+    ) -> tuple[LinkLines, UInt8[np.ndarray, "S 3"]]:
         """Return the lines of one window's links in space, and their colours.
 
         They are `base_m` above the robots' places [m].

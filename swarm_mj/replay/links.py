@@ -53,7 +53,7 @@ LINK = np.dtype(
     ]
 )
 LinkRows: TypeAlias = Shaped[np.ndarray, "_"]  # an array of `LINK`
-Segments: TypeAlias = Float[np.ndarray, "_ 2 D"]  # from start to end, on the map or in space [m]
+LinkLines: TypeAlias = Float[np.ndarray, "_ 2 D"]  # from start to end, on the map or in space [m]
 
 
 class PacketPaths(NamedTuple):
@@ -222,14 +222,14 @@ def by_kind(links: LinkRows) -> dict[LinkKind, LinkRows]:
     return {"unbelieved": links[~is_too_weak], "too_weak": links[is_too_weak]}
 
 
-def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> Segments:
+def ends(links: LinkRows, position_m: Positions, row: int | Int[np.ndarray, "L"]) -> LinkLines:
     """Return where links begin and end, by the robots' positions in a window or each one's [m]."""
     start_m = position_m[row, links["sender"]]
     end_m = position_m[row, links["receiver"]]
     return np.stack([start_m, end_m], axis=1)
 
 
-def divided(lines_m: Segments, pieces: Float[np.ndarray, "P 2"]) -> Segments:
+def divided(lines_m: LinkLines, pieces: Float[np.ndarray, "P 2"]) -> LinkLines:
     """Divide lines from start to end into pieces, as many of each [m]."""
     start_m, end_m = np.moveaxis(lines_m, 1, 0)
     way_m = end_m - start_m

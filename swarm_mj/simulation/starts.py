@@ -43,16 +43,16 @@ class Starts:
 
     def is_blocked(self, position_m: Float[np.ndarray, "N D"]) -> Bool[np.ndarray, "N"]:
         """Return which robots would touch an obstacle there, or another robot if they collide."""
-        blocks = np.zeros(len(position_m), dtype=bool)
+        is_hit = np.zeros(len(position_m), dtype=bool)
         height_m = np.full(len(position_m), ROBOT_HEIGHT_M)
         if position_m.shape[1] > PLANE:
             height_m = position_m[:, HEIGHT].copy()
         reach_m = self.worlds.reach_m
         if self.worlds.obstacles is not None:
-            blocks = blocked(position_m, height_m, reach_m, self.worlds.obstacles)
+            is_hit = blocked(position_m, height_m, reach_m, self.worlds.obstacles)
         if self.mission.collide:
             apart_m = np.linalg.norm(position_m[:, np.newaxis] - position_m, axis=-1)
             needed_m = reach_m[:, np.newaxis] + reach_m
             overlaps = np.tril(apart_m < needed_m, k=-1)  # the first one may stay
-            blocks |= np.any(overlaps, axis=1)
-        return blocks
+            is_hit |= np.any(overlaps, axis=1)
+        return is_hit

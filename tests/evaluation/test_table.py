@@ -239,7 +239,7 @@ def test_other_regimes_are_tables_of_their_own_and_say_so(printed, other, said):
     assert text.count(said) == 1
 
 
-# Fields in which a number or a choice counts that has no switch, or whose values are not evident.
+# Fields whose other value, or what it needs to count, does not follow from their declarations.
 AMONG_BODIES = {"robot": "quadrotor"}
 OTHER = {
     "arena": {"arena": "blocks"},
@@ -277,26 +277,30 @@ def other_fields(spec):
     return needed | {spec.name: value}
 
 
+# The columns that the title takes.
+OF_MISSIONS = (
+    *("task", "preset", "num_robots", "range_ratio", "velocity_ratio", "boundary", "physics"),
+    *("num_windows", "failure_fraction", "episodes", "seed", "arena", "radio", "prior_knowledge"),
+    *("robot", "bit_rate"),
+)
+
+
 def title_of(mission):
     """The title of a mission's results: as they are made, but for what was measured."""
     study = SimpleNamespace(episodes=3, seed=4)
     own = SimpleNamespace(mission=mission, study=study, component=lambda _kind: None)
-    cells = {name: getattr(mission, name) for name in ("task", "preset")}
-    for name in list(COMPUTATIONS)[: list(COMPUTATIONS).index("probability")]:
-        if name != "policy":
-            cells[name] = COMPUTATIONS[name](own)
-    for name in ("arena", "radio", "prior_knowledge", "robot", "bit_rate"):
-        cells[name] = COMPUTATIONS[name](own)
+    cells = {name: COMPUTATIONS[name](own) for name in OF_MISSIONS}
     none = dict.fromkeys(("channel", "controller", "scene", "pilot"))
     return missions_title(
         some_result("a", 1.0, **none, **cells, config=json.dumps(asdict(mission)))
     )
 
 
-@pytest.mark.parametrize("spec", fields(Mission), ids=lambda spec: spec.name)
+OPTIONS = [spec for spec in fields(Mission) if meaning_of(spec).help]  # the title names presets
+
+
+@pytest.mark.parametrize("spec", OPTIONS, ids=lambda spec: spec.name)
 def test_missions_that_differ_in_an_option_differ_in_their_title(spec):
-    if not meaning_of(spec).help:
-        return  # only presets set it, which the title names
     other = other_fields(spec)
     usual = {name: value for name, value in other.items() if name != spec.name}
     titles = [title_of(paper(**{"task": "random-walk"} | given)) for given in (usual, other)]

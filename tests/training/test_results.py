@@ -69,6 +69,10 @@ def test_an_interrupted_study_leaves_no_table(tmp_path, monkeypatch):
     assert not list(tmp_path.glob("*.csv"))
 
 
+def test_all_that_no_study_describes_is_flown_by_a_function():
+    assert program.FLOWN_BY.keys() == set(program.OTHERS)
+
+
 @pytest.mark.parametrize("name", program.STUDIES)
 def test_every_study_can_be_read_and_says_its_missions(name):
     study = program.study_of(name)

@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped
 
-from swarm_mj.mission.geometry import PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.policies.gnn.features import Feature, dtype_of, names_of
 from swarm_mj.policies.gnn.graphs import FeatureExtractor, Graphs
 from swarm_mj.policies.gnn.packet_memory import log_age
@@ -331,7 +331,7 @@ def _write_teammates(
             y_mps = own.velocity_mps[k, 1] - own.velocity_mps[i, 1]
             squared = x * x + y * y
             if own.position_m.shape[1] > PLANE:  # ranks and turns below are by places in the plane
-                squared += ((own.position_m[k, 2] - own.position_m[i, 2]) * per_m) ** 2
+                squared += ((own.position_m[k, HEIGHT] - own.position_m[i, HEIGHT]) * per_m) ** 2
             ranges = np.sqrt(squared)
         of_k.x = max(-FAR_RANGES, min(FAR_RANGES, x))
         of_k.y = max(-FAR_RANGES, min(FAR_RANGES, y))

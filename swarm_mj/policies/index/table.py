@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Float32, Int, Int8, Int16
 
-from swarm_mj.mission.geometry import PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.policies.index.weights import MOST, Weights
 from swarm_mj.protocol.buffers import ABSENT
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, rise
@@ -204,7 +204,7 @@ def _note_decoded(
             position_m[j, 0] - position_m[sender, 0], position_m[j, 1] - position_m[sender, 1]
         )
         if position_m.shape[1] > PLANE:
-            apart_m = np.hypot(apart_m, position_m[j, 2] - position_m[sender, 2])
+            apart_m = np.hypot(apart_m, position_m[j, HEIGHT] - position_m[sender, HEIGHT])
         share = chance_within(apart_m / range_m, shared, SHARED_SCALE)
         if share > LEAST_CHANCE:
             raise_bound(table.bound[b, i, r], said, np.float32(share))
@@ -291,7 +291,9 @@ def _look_around(
         sum_y += y
         sum_ranges += ranges[j]
         if position_m.shape[1] > PLANE:  # an edge is one in the plane, but packets rise
-            ranges[j] = np.hypot(ranges[j], (position_m[j, 2] - position_m[i, 2]) / range_m)
+            ranges[j] = np.hypot(
+                ranges[j], (position_m[j, HEIGHT] - position_m[i, HEIGHT]) / range_m
+            )
         if ranges[j] < TAKEN_WITHIN:
             neighbours += chance_within(ranges[j], reach, REACH_SCALE)
     edge = MIDDLE

@@ -9,6 +9,7 @@ from mixed_missions import MISSION as WALK
 from mixed_missions import flown
 
 from swarm_mj.mission import paper, reference
+from swarm_mj.policies.gnn import turn_features
 from swarm_mj.policies.gnn.turn_features import TurnFeatures
 from swarm_mj.protocol.buffers import NEVER, empty_buffers
 from swarm_mj.protocol.window import LocalViews
@@ -77,6 +78,15 @@ def log_count(count):
 def check(found, expected):
     for name, values in expected.items():
         np.testing.assert_allclose(found[name], values, rtol=1e-6, err_msg=name)
+
+
+def test_places_of_distances_are_named_by_them():
+    places = {name: place for name, place in vars(turn_features).items() if name.startswith("AT_")}
+    assert len(places) == len(turn_features.DISTANCES_APART)
+    for name, place in places.items():
+        digits = name.removeprefix("AT_")
+        named = float(f"{digits[0]}.{digits[1:] or 0}")
+        assert turn_features.DISTANCES_APART[place] == named
 
 
 def test_the_names_are_those_of_stored_policies_in_their_order():
