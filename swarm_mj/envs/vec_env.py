@@ -44,6 +44,7 @@ class BatchVecEnv(VecEnv):
         ends = np.cumsum(sizes).tolist()
         self._envs = [slice(end - size, end) for end, size in zip(ends, sizes, strict=True)]
         super().__init__(sum(sizes), observation_space, action_space)
+        self.seed(None)
 
     def step_async(self, actions: np.ndarray) -> None:
         """Take the actions; `step_wait` plays them."""
@@ -140,17 +141,6 @@ class SwarmVecEnv(BatchVecEnv):
 
     Policies may ask for the `action_masks` of sb3-contrib.
     """
-
-    def __init__(
-        self,
-        batches: Sequence[MissionBatch],
-        agent: str,
-        observation_space: spaces.Space,
-        action_space: spaces.Space,
-    ) -> None:
-        """As of `BatchVecEnv`; the first missions' seeds are drawn."""
-        super().__init__(batches, agent, observation_space, action_space)
-        self.seed(None)
 
     def seed(self, seed: int | None = None) -> Sequence[int | None]:
         """Let the next reset begin the missions of seeds from this one on; return each one's."""
