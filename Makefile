@@ -172,7 +172,7 @@ format: $(DEV)
 PAPERS := random-flooding round-robin mst tdma planner GNN "linear GNN" "GNN on turns" "linear GNN on turns" \
   "one GNN" "GNN generalized from 0.25" "GNN trained at each size" "GNN generalized from 40" \
   "GNN trained on AoI" "GNN trained on velocity variance"
-OURS := planner "planner --payload none" sotdma age-gain-csma gnn spatial-tdma tdma gossip csma aloha random-flooding \
+OURS := planner "planner --payload none" sotdma index-csma age-gain-csma gnn spatial-tdma tdma gossip csma aloha random-flooding \
   greedy-oracle lookahead-oracle
 
 # STUDIES="city channels" flies these tables only; an interrupted run continues.
@@ -193,12 +193,12 @@ leaderboard: setup
 figures: setup
 	$(BIN)/swarm-mj figures training/results/reference-*.csv --out assets/figures/reference --force
 	for name in fig2 fig3 fig4 fig5 fig6; do \
-	  $(BIN)/swarm-mj figures training/results/paper-*.csv \
+	  $(BIN)/swarm-mj figures \
 	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv 2>/dev/null) \
-	    $$(test $$name = fig3 || ls training/results/reproduce/$(BUDGET)/one.csv 2>/dev/null) \
+	    $$(test $$name = fig3 || ls training/results/paper-*.csv training/results/reproduce/$(BUDGET)/one.csv) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
-	$(BIN)/swarm-mj figures training/results/paper-*.csv training/results/lookahead.csv \
+	$(BIN)/swarm-mj figures training/results/paper-*.csv \
 	  --figure fig5 fig6 --policy $(OURS) \
 	  --out assets/figures/policies --force
 	$(BIN)/python training/convergence_figure.py

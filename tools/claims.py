@@ -18,7 +18,7 @@ from swarm_mj.system.reading import read_rows
 ROOT = Path(__file__).resolve().parent.parent
 TRAINED = ROOT / "training" / "reproduce" / "quick"  # the trainings, a folder for each figure
 OURS = ["one GNN", "one GNN, seed 2", "one GNN, seed 3"]
-INFORMED = ("planner", "planner --payload none", "greedy-oracle")
+INFORMED = ("planner", "planner --payload none", "greedy-oracle", "lookahead-oracle")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -79,7 +79,7 @@ def correlation(folder: Path) -> str:
     rows: list[list[str]] = []
     for name, left_out in (
         ("all policies", ()),
-        ("without `planner` and `greedy-oracle`", INFORMED),
+        ("without `planner` and the oracles", INFORMED),
     ):
         policies = [row for row in flown if row["policy"] not in left_out]
         cells = [

@@ -167,7 +167,9 @@ def _name(row: dict[str, Any], used: Rows) -> str:
     more = any(each.get("payload") not in (None, "none") for each in its)
     policy = str(row["policy"])
     own = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else policy
-    name = NAMES.get(policy, own)
+    versions = {each.get("version") for each in its}
+    called = f"{policy} {versions.pop()}" if len(versions) == 1 else policy
+    name = NAMES.get(called, NAMES.get(policy, own))
     return f"{name} ({LARGER_PACKETS})" if more else name
 
 

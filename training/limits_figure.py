@@ -4,7 +4,7 @@
 
 Draws assets/figures/policies/fig4.svg and .png from `training/results/`: the package's policies,
 the floor of `bounds.py`, proven for every policy, and the schedules of `ceiling.py`. Also makes the
-tables of `docs/bounds.md`, from the same results and from those of `lookahead-oracle`.
+tables of `docs/bounds.md`, from the same results.
 """
 
 import math
@@ -48,40 +48,34 @@ class Compared:
     """Missions on which both oracles have flown."""
 
     head: str
-    lookahead: str  # the results, without an ending
-    greedy: str
+    results: str  # without an ending
     where: dict[str, float | str]  # of the missions that these files have
 
 
 COMPARED = (
     Compared(
         head="40 at rest, range ratio 0.25",
-        lookahead="lookahead",
-        greedy="paper-stationary",
+        results="paper-stationary",
         where={"task": "stationary", "range_ratio": 0.25},
     ),
     Compared(
         head="40 walking",
-        lookahead="lookahead",
-        greedy="paper-random-walk",
+        results="paper-random-walk",
         where={"task": "random-walk", "num_robots": 40},
     ),
     Compared(
         head="80 walking",
-        lookahead="lookahead",
-        greedy="paper-random-walk",
+        results="paper-random-walk",
         where={"task": "random-walk", "num_robots": 80},
     ),
     Compared(
         head="40 flocking, velocity ratio 0.15",
-        lookahead="lookahead",
-        greedy="paper-flocking",
+        results="paper-flocking",
         where={"task": "flocking", "velocity_ratio": 0.15},
     ),
     Compared(
         head="20 at rest among `blocks`",
-        lookahead="lookahead-blocks",
-        greedy="lookahead-blocks",
+        results="lookahead-blocks",
         where={"task": "stationary", "num_robots": 20},
     ),
 )
@@ -181,8 +175,9 @@ def oracles_table(folder: Path) -> str:
 
 def _both(compared: Compared, folder: Path, column: str, digits: int) -> list[str]:
     """Return both oracles' costs and the difference, pair by pair, with standard errors."""
-    ahead = _by_seed(folder / f"{compared.lookahead}.parquet", LOOKAHEAD, compared, column)
-    greedy = _by_seed(folder / f"{compared.greedy}.parquet", GREEDY, compared, column)
+    path = folder / f"{compared.results}.parquet"
+    ahead = _by_seed(path, LOOKAHEAD, compared, column)
+    greedy = _by_seed(path, GREEDY, compared, column)
     if not ahead or ahead.keys() != greedy.keys():
         raise ValueError(f"both oracles must have flown the same missions of {compared.head}")
     pairs = [(ahead[seed], greedy[seed]) for seed in ahead]

@@ -25,8 +25,7 @@ from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 
 ROOT = Path(__file__).resolve().parent.parent
-POLICIES = ("planner", "sotdma", "age-gain-csma", "gnn", "tdma", "random-flooding")
-SHIPPED = "one GNN"  # the curve that is `gnn`, whose rows among the results are of version 1.0
+POLICIES = ("planner", "sotdma", "index-csma", "gnn", "tdma", "random-flooding")
 PUBLISHED = ("GNN trained at each size", "GNN generalized from 40")
 
 
@@ -45,12 +44,6 @@ class ReadmeFigure:
         metavar="FILE",
         shown="training/results/paper-random-walk.csv",
     )
-    gnn: Path = setting(
-        ROOT / "training" / "results" / "reproduce" / "quick" / "one.csv",
-        "those of gnn",
-        metavar="FILE",
-        shown="training/results/reproduce/quick/one.csv",
-    )
 
     def __call__(self) -> int:
         """Draw the figure; return the exit code."""
@@ -58,17 +51,7 @@ class ReadmeFigure:
         return DONE
 
     def _draw(self) -> Figure:
-        return draw([*others(read_results(self.results)), *shipped(read_results(self.gnn))])
-
-
-def others(results: Sequence[Result]) -> list[Result]:
-    """Return the results of all policies but `gnn`."""
-    return [result for result in results if result.policy != "gnn"]
-
-
-def shipped(results: Sequence[Result]) -> list[Result]:
-    """Return the results of the network that is shipped, under its name there."""
-    return [replace(result, policy="gnn") for result in results if result.policy == SHIPPED]
+        return draw(read_results(self.results))
 
 
 def draw(results: Sequence[Result]) -> Figure:

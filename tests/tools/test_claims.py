@@ -101,7 +101,7 @@ def test_correlations_with_and_without_those_who_know_more(folder):
     every, others = cells(claims.correlation(folder))
     # Ranks 1, 2, 3, 4 and 4, 1, 2, 3 differ by 3, 1, 1 and 1: 1 - 6 * 12 / (4 * 15).
     assert every == ["all policies (4)", *["-0.20"] * 4]
-    assert others == ["without `planner` and `greedy-oracle` (3)", *["1.00"] * 4]
+    assert others == ["without `planner` and the oracles (3)", *["1.00"] * 4]
 
 
 def test_trainings_are_counted_by_figure(trained, tmp_path):

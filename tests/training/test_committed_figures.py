@@ -55,7 +55,10 @@ def drawn_methods():
 def test_a_figure_s_caption_is_that_of_its_results(results, name, kind):
     """The same commit, number of missions and seeds."""
     preset, rows = results
-    figure, rows = RESULT_FIGURES[name], [*rows, *reproduced(preset, name)]
+    figure = RESULT_FIGURES[name]
+    trained = reproduced(preset, name)
+    # GNNs of Fig. 3 fly fewer missions than the baselines do: `make figures` leaves those out.
+    rows = trained if name == "fig3" and trained else [*rows, *trained]
     found = results_of(figure, rows)
     if preset == "paper":
         found = [result for result in found if method_of(result) in drawn_methods()]

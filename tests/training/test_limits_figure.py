@@ -102,22 +102,21 @@ def test_small_teams_stand_in_a_table_of_their_own(tmp_path):
 
 @pytest.fixture
 def oracles(tmp_path, monkeypatch):
-    """Both oracles' costs of three flights, whose other order in one file must not matter."""
+    """Both oracles' costs of three flights."""
     mission = paper("flocking", num_robots=5, num_windows=8)
-    fields = {"lookahead": "ahead", "greedy": "greedy"}
     where = {"task": "flocking", "num_robots": 5}
-    compared = Compared(head="five", **fields, where=where)
-    at_rest = Compared(head="rest", **fields, where=where | {"task": "stationary"})
+    compared = Compared(head="five", results="both", where=where)
+    at_rest = Compared(head="rest", results="both", where=where | {"task": "stationary"})
     monkeypatch.setattr(limits_figure, "COMPARED", (compared, at_rest))
     rest = paper("stationary", num_robots=5, num_windows=8)
     costs = {}
-    for file, name in (("ahead", "lookahead-oracle"), ("greedy", "greedy-oracle")):
-        flown = [
-            *swarm_mj.evaluate((name, "tdma"), mission, num_missions=3, seed=4).results,
-            *swarm_mj.evaluate((name,), rest, num_missions=3, seed=4).results,
-        ]
-        write_missions(tmp_path / f"{file}.parquet", flown)
-        costs[file] = [flown[0].aoi, flown[0].velocity_variance, flown[2].aoi]
+    flown = []
+    for name in ("lookahead-oracle", "greedy-oracle"):
+        [flocks] = swarm_mj.evaluate((name,), mission, num_missions=3, seed=4).results
+        [resting] = swarm_mj.evaluate((name,), rest, num_missions=3, seed=4).results
+        flown += [flocks, resting]
+        costs[name] = [flocks.aoi, flocks.velocity_variance, resting.aoi]
+    write_missions(tmp_path / "both.parquet", flown)
     return tmp_path, costs
 
 
@@ -146,7 +145,10 @@ def test_oracles_are_compared_mission_by_mission(oracles):
 def test_oracles_that_flew_other_missions_are_not_compared(oracles):
     folder, _ = oracles
     mission = paper("flocking", num_robots=5, num_windows=8)
-    flown = swarm_mj.evaluate(("greedy-oracle",), mission, num_missions=3, seed=5).results
-    write_missions(folder / "greedy.parquet", flown)
+    flown = [
+        *swarm_mj.evaluate(("lookahead-oracle",), mission, num_missions=3, seed=4).results,
+        *swarm_mj.evaluate(("greedy-oracle",), mission, num_missions=3, seed=5).results,
+    ]
+    write_missions(folder / "both.parquet", flown)
     with pytest.raises(ValueError, match="both oracles must have flown the same missions of five"):
         oracles_table(folder)
