@@ -3,6 +3,7 @@
 Each mission has streams of its own, so that the missions beside it do not change it.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from numbers import Integral
 from typing import NamedTuple, Protocol, runtime_checkable
@@ -89,3 +90,17 @@ class Stream:
             self._next = 0
         self._next += 1
         return self._block[self._next - 1]
+
+
+def correlated(
+    before: Float[np.ndarray, "*S"], fresh: Float[np.ndarray, "*S"], kept: float
+) -> Float[np.ndarray, "*S"]:
+    """Return the next values of a first-order Gauss-Markov process, of a constant variance.
+
+    Args:
+        before: Those of a step before.
+        fresh: Draws of the same variance.
+        kept: The share of a value that is left a step later, on [0, 1].
+    """
+    # The shares' squares add up to 1, so that values stay as large as they are.
+    return kept * before + math.sqrt(1.0 - kept**2) * fresh

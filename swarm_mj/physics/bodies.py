@@ -17,13 +17,25 @@ from mujoco._structs import MjModel
 from swarm_mj.mission import Mission
 from swarm_mj.mission.batched_rng import Started
 from swarm_mj.mission.faults import MIN_SURVIVORS
-from swarm_mj.mission.geometry import HEIGHT, PLANE
+from swarm_mj.mission.geometry import HEIGHT, PLANE, SPACE
 from swarm_mj.physics.energy import Motors, motors_of, use_energy
 from swarm_mj.physics.obstacles import obstacles_of
 from swarm_mj.physics.pilots import GRAVITY_MPS2, Pilot, Sensed, SetPoint
-from swarm_mj.physics.robot_model import FREE_QPOS, PLANAR_QPOS, collides, is_motor
-from swarm_mj.physics.robots import (
+from swarm_mj.physics.robot_model import (
+    ABOUT_Z,
+    ATTITUDE,
     FREE_QVEL,
+    HEADING,
+    LEVEL,
+    PLACE,
+    PLANAR_PLACE,
+    REAL,
+    TURN_RATE,
+    VELOCITY,
+    collides,
+    is_motor,
+)
+from swarm_mj.physics.robots import (
     OwnPilot,
     RobotKind,
     kinds_of,
@@ -39,7 +51,6 @@ from swarm_mj.system.compiled import compiled
 from swarm_mj.system.user_code import is_ours
 
 LAGS = [int(mjtDyn.mjDYN_FILTER), int(mjtDyn.mjDYN_FILTEREXACT)]  # a control, a while later
-VARIED = ("body_mass", "body_inertia", "actuator_gainprm")  # from robot to robot
 FARTHEST = 1e6  # no robot of a stable model gets so far [m], or so fast [m/s and rad/s]
 # Of what has crashed [rad/s]: in a storm it tumbles, and Euler's steps would spin it up for ever.
 MOST_TUMBLING_RPS = 100.0
@@ -210,7 +221,9 @@ class BodyWorlds:
         Both factors are normal around 1, cut off at three deviations.
         """
         model = self._model
-        mass_kg, inertia_kgm2, gain = (self._batch.expand(name) for name in VARIED)
+        mass_kg = self._batch.expand("body_mass")
+        inertia_kgm2 = self._batch.expand("body_inertia")
+        gain = self._batch.expand("actuator_gainprm")
         spread = self._mission.robot_spread
         shape = (2, self._mission.num_robots)
         drawn = np.clip(np.stack([rng.normal(0.0, 1.0, shape) for rng in rngs]), -3.0, 3.0)
@@ -247,17 +260,16 @@ class BodyWorlds:
         self.states = replace(self.states, is_active=None)
         for flown in self._flown:
             flown.energy_j[:] = np.nan if flown.motors is None else 0.0
-            its_m = position_m[:, flown.robots]
-            its_mps = velocity_mps[:, flown.robots]
+            place_m = position_m[:, flown.robots]
+            first_mps = velocity_mps[:, flown.robots]
             if flown.kind.is_free:
-                flown.qpos[..., :3] = its_m
-                flown.qpos[..., 3] = 1.0
-                flown.qpos[..., 4:FREE_QPOS] = 0.0
-                flown.qvel[..., :3] = its_mps
+                flown.qpos[..., PLACE] = place_m
+                flown.qpos[..., ATTITUDE] = LEVEL
+                flown.qvel[..., VELOCITY] = first_mps
             else:
-                flown.qpos[..., :2] = its_m[..., :2]
-                flown.qpos[..., 2] = np.arctan2(its_mps[..., 1], its_mps[..., 0])
-                flown.qvel[..., :2] = its_mps[..., :2]
+                flown.qpos[..., PLANAR_PLACE] = place_m[..., :PLANE]
+                flown.qpos[..., HEADING] = np.arctan2(first_mps[..., 1], first_mps[..., 0])
+                flown.qvel[..., PLANAR_PLACE] = first_mps[..., :PLANE]
         if self._num_sensed > 0:
             self._batch.forward()  # or pilots would begin with what sensors measured before
         self._steer()
@@ -440,10 +452,10 @@ def _free_states(
 ) -> Sensed:
     """Return views of the states of free bases, made once: they follow MuJoCo's steps."""
     return Sensed(
-        position_m=_seen(qpos[..., :3]),
-        attitude=_seen(qpos[..., 3:FREE_QPOS]),
-        velocity_mps=_seen(qvel[..., :3]),
-        turn_rate_rps=_seen(qvel[..., 3:FREE_QVEL]),
+        position_m=_seen(qpos[..., PLACE]),
+        attitude=_seen(qpos[..., ATTITUDE]),
+        velocity_mps=_seen(qvel[..., VELOCITY]),
+        turn_rate_rps=_seen(qvel[..., TURN_RATE]),
         sensors=sensors,
     )
 
@@ -455,17 +467,17 @@ def _sensed(flown: _Flown) -> Sensed:
     qpos = flown.qpos
     qvel = flown.qvel
     shape = qpos.shape[:2]
-    position_m = np.empty((*shape, 3))
-    velocity_mps = np.zeros((*shape, 3))
+    position_m = np.empty((*shape, SPACE))
+    velocity_mps = np.zeros((*shape, SPACE))
     attitude = np.zeros((*shape, 4))
-    turn_rate_rps = np.zeros((*shape, 3))
-    position_m[..., :2] = qpos[..., :2]
+    turn_rate_rps = np.zeros((*shape, SPACE))
+    position_m[..., :PLANE] = qpos[..., PLANAR_PLACE]
     position_m[..., HEIGHT] = flown.kind.base_m
-    velocity_mps[..., :2] = qvel[..., :2]
-    half = 0.5 * qpos[..., 2]
-    attitude[..., 0] = np.cos(half)
-    attitude[..., 3] = np.sin(half)
-    turn_rate_rps[..., 2] = qvel[..., PLANAR_QPOS - 1]
+    velocity_mps[..., :PLANE] = qvel[..., PLANAR_PLACE]
+    half = 0.5 * qpos[..., HEADING]
+    attitude[..., REAL] = np.cos(half)
+    attitude[..., ABOUT_Z] = np.sin(half)
+    turn_rate_rps[..., HEIGHT] = qvel[..., HEADING]  # about the vertical
     return Sensed(position_m, attitude, velocity_mps, turn_rate_rps, flown.sensors)
 
 
@@ -486,7 +498,7 @@ def _slow_tumbling(has_crashed: Bool[np.ndarray, "B n"], qvel: Float[np.ndarray,
     for b in range(qvel.shape[0]):
         for i in range(qvel.shape[1]):
             if has_crashed[b, i]:
-                for axis in range(3, FREE_QVEL):
+                for axis in range(SPACE, FREE_QVEL):
                     rate = qvel[b, i, axis]
                     qvel[b, i, axis] = min(max(rate, -MOST_TUMBLING_RPS), MOST_TUMBLING_RPS)
 

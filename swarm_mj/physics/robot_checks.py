@@ -8,6 +8,7 @@ from mujoco._structs import MjModel
 from swarm_mj.physics.arena_files import take_over_settings
 from swarm_mj.physics.pilots import GRAVITY_MPS2
 from swarm_mj.physics.robot_model import (
+    LEVEL,
     PLANAR_QPOS,
     antenna_offset_m,
     attached,
@@ -97,7 +98,7 @@ def _is_at_origin(model: MjModel) -> bool:
     """Return whether a planar base has the coordinates that its joints have; a free one may not."""
     if is_free_base(model):
         return True
-    is_level = np.allclose(model.body_quat[1], [1.0, 0.0, 0.0, 0.0])
+    is_level = np.allclose(model.body_quat[1], LEVEL)
     is_central = not np.any(model.body_pos[1, :2]) and not np.any(model.jnt_pos[:3])
     return is_level and is_central and not np.any(model.qpos0[:PLANAR_QPOS])
 

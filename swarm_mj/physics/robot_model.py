@@ -7,8 +7,21 @@ from mujoco._functions import mj_forward, mj_name2id
 from mujoco._specs import MjsBody, MjSpec
 from mujoco._structs import MjData, MjModel
 
-FREE_QPOS = 7  # of a free base: a place and a quaternion
-PLANAR_QPOS = 3  # of one that slides along x and y, and turns about z
+# MuJoCo's coordinates of a free base, and their rates.
+PLACE = slice(0, 3)
+ATTITUDE = slice(3, 7)  # a quaternion
+FREE_QPOS = 7
+VELOCITY = slice(0, 3)
+TURN_RATE = slice(3, 6)
+FREE_QVEL = 6
+# Of one that slides along x and y, and turns about z; of its rates, too.
+PLANAR_PLACE = slice(0, 2)
+HEADING = 2
+PLANAR_QPOS = 3
+# Of a quaternion.
+REAL = 0
+ABOUT_Z = 3
+LEVEL = (1.0, 0.0, 0.0, 0.0)
 ANTENNA = "antenna"  # the site where a model has it
 
 
@@ -27,7 +40,8 @@ def rest_pose(model: MjModel) -> MjData:
     """Return a robot whose base is level at the origin, or on its plane, all other joints at 0."""
     data = MjData(model)
     if is_free_base(model):
-        data.qpos[:FREE_QPOS] = (0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0)
+        data.qpos[PLACE] = 0.0
+        data.qpos[ATTITUDE] = LEVEL
     mj_forward(model, data)
     return data
 

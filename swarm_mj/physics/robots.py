@@ -20,12 +20,21 @@ from mujoco._specs import MjSpec
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.arena_files import read_mjcf, refused, take_over_settings
 from swarm_mj.physics.declarations import Declarations, declared_by
 from swarm_mj.physics.pilots import Airframe, Pilot, QuadrotorPilot, RoverPilot
 from swarm_mj.physics.robot_checks import check_robot
 from swarm_mj.physics.robot_model import (
-    FREE_QPOS,
+    ABOUT_Z,
+    ATTITUDE,
+    FREE_QVEL,
+    HEADING,
+    PLACE,
+    PLANAR_PLACE,
+    REAL,
+    TURN_RATE,
+    VELOCITY,
     antenna_offset_m,
     attached,
     collides,
@@ -39,7 +48,6 @@ from swarm_mj.system.decibels import from_db
 from swarm_mj.system.packages import asset
 from swarm_mj.system.user_code import make
 
-FREE_QVEL = 6  # of a free base: velocity and turn rate
 PLANAR_AXES = [0, 1, 5]  # of the six, which one on a plane has: along x and y, about z
 
 OwnPilot = Pilot | type | str  # an object, a class that is made for an airframe, or its name
@@ -120,7 +128,7 @@ class RobotKind:
     @property
     def thrust_axes(self) -> Float[np.ndarray, "U 3"]:
         """Each motor's thrust on the base, in its axes, by its force before gears [1]."""
-        return self._effects()[:, :3]
+        return self._effects()[:, VELOCITY]
 
     @property
     def mass_kg(self) -> float:
@@ -148,8 +156,8 @@ class RobotKind:
         mj_fullM(model, rest_pose(model), full)
         diagonal = np.diag(full)
         if self.is_free:
-            return diagonal[3:FREE_QVEL].copy()
-        return np.array([np.inf, np.inf, diagonal[2]])  # it turns about the vertical alone
+            return diagonal[TURN_RATE].copy()
+        return np.array([np.inf, np.inf, diagonal[HEADING]])  # it turns about the vertical alone
 
     def airframe(self, step_s: float) -> Airframe:
         """Return the model as a pilot is made for it, at this step of MuJoCo's."""
@@ -324,18 +332,18 @@ def pose_of(
         for i in range(kind.first, kind.first + kind.num_robots):
             qpos = kind.model.qpos0.copy()
             if kind.is_free:
-                qpos[:3] = position_m[i]
-                qpos[3:FREE_QPOS] = attitude[i]
+                qpos[PLACE] = position_m[i]
+                qpos[ATTITUDE] = attitude[i]
             else:
-                qpos[:2] = position_m[i, :2]
-                qpos[2] = heading_of(attitude[i])
+                qpos[PLANAR_PLACE] = position_m[i, :PLANE]
+                qpos[HEADING] = heading_of(attitude[i])
             parts.append(qpos)
     return np.concatenate(parts)
 
 
 def heading_of(attitude: Float[np.ndarray, "4"]) -> float:
     """Return the turn about the vertical of a robot that stands level [rad]."""
-    return 2.0 * math.atan2(attitude[3], attitude[0])
+    return 2.0 * math.atan2(attitude[ABOUT_Z], attitude[REAL])
 
 
 def _read(kind: str) -> MjSpec:

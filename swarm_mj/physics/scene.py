@@ -13,9 +13,11 @@ from mujoco._specs import MjsActuator, MjsGeom, MjsJoint, MjSpec
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.arenas import arena_of
 from swarm_mj.physics.obstacles import OBSTACLE_GROUP, ROBOTS_BIT, SCENE_BIT
 from swarm_mj.physics.pilots import GRAVITY_MPS2
+from swarm_mj.physics.robot_model import PLANAR_PLACE, VELOCITY
 from swarm_mj.physics.robots import RobotKind, add_robots, kinds_of, pose_of
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.arguments import name_of
@@ -56,6 +58,7 @@ SQUARES_PER_M = 5.0 / 1000.0  # repeats of the floor's texture, assets/arena.xml
 BEACON_RADIUS_M = 8.0  # assets/robot.xml, for an area of 1 km; larger areas have larger beacons
 AIR_DENSITY = 1.204  # around bodies, at 20 °C and sea level [kg/m³]
 AIR_VISCOSITY = 1.82e-5  # likewise [Pa s]
+ROUNDING = 1e-9  # of a number of steps: where a step divides a window, none is added
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
@@ -139,7 +142,7 @@ def num_body_steps(mission: Mission, kinds: Sequence[RobotKind]) -> int:
 
 def _steps_of(mission: Mission, longest_s: float) -> int:
     """Return the steps into which a window is divided, none longer than this."""
-    return math.ceil(mission.window_s / longest_s - 1e-9)
+    return math.ceil(mission.window_s / longest_s - ROUNDING)
 
 
 def compiled_scene(spec: MjSpec, scene: Scene | None) -> MjModel:
@@ -363,13 +366,13 @@ def _place_bodies(
             if kind.is_free:
                 base.pos = position_m[i]
                 base.quat = attitude[i]
-                own_mps[:3] = velocity_mps[i]
+                own_mps[VELOCITY] = velocity_mps[i]
             else:
-                x, y = position_m[i, :2].tolist()
+                x, y = position_m[i, :PLANE].tolist()
                 base.pos = [x, y, kind.base_m]
-                for joint, ref in zip(base.joints[:2], (x, y), strict=True):
+                for joint, ref in zip(base.joints[PLANAR_PLACE], (x, y), strict=True):
                     joint.ref = ref  # headings are in the keyframe: turned, it would slide aslant
-                own_mps[:2] = velocity_mps[i, :2]
+                own_mps[PLANAR_PLACE] = velocity_mps[i, :PLANE]
             qvel.append(own_mps)
     qpos = pose_of(kinds, position_m, attitude)
     spec.add_key(name="start", qpos=qpos, qvel=np.concatenate(qvel))

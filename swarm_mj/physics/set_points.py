@@ -9,6 +9,7 @@ from jaxtyping import Float
 
 from swarm_mj.mission.bodies import LEAST_HEIGHT_M
 from swarm_mj.mission.geometry import HEIGHT, PLANE
+from swarm_mj.physics.worlds import next_velocity
 from swarm_mj.system.compiled import compiled
 
 RESTS_MPS = 1e-6  # a set point slower than this is 0: sums of accelerations end a rounding away
@@ -30,8 +31,9 @@ def move_set_points(
     for b in range(acceleration.shape[0]):
         for i in range(acceleration.shape[1]):
             for axis in range(3):
-                u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
-                v = min(max(course_mps[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
+                v = next_velocity(
+                    course_mps[b, i, axis], acceleration[b, i, axis], dt_s, limit_mps2, limit_mps
+                )
                 p = position[b, i, axis]
                 if axis < PLANE and abs(p) > wall_m and p * v > 0.0:
                     v = -v

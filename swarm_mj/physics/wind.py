@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.mission.batched_rng import Stream, correlated, normal
 from swarm_mj.mission.geometry import PLANE
 
 
@@ -40,7 +40,7 @@ class Wind:
         """Let gusts change by a window."""
         if self._gusts is not None:
             fresh_mps = self._mission.gust_mps * self._gusts.next()
-            self._gust_mps = self._kept * self._gust_mps + np.sqrt(1.0 - self._kept**2) * fresh_mps
+            self._gust_mps = correlated(self._gust_mps, fresh_mps, self._kept)
         self._blow()
 
     @property

@@ -22,6 +22,7 @@ from mujoco import batch
 from mujoco._structs import MjModel  # private: type checkers see it only there
 
 from swarm_mj.mission import Mission
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.obstacles import Obstacles, obstacles_of
 from swarm_mj.physics.scene import (
     ROBOT_MASS_KG,
@@ -111,7 +112,7 @@ class PointWorlds:
         found = obstacles_of(self._model)
         self.obstacles = found if len(found.kind) > 0 else None
         self._batch = batch.Batch(self._model, num_missions, num_threads)
-        shape = (num_missions, mission.num_robots, 2)
+        shape = (num_missions, mission.num_robots, PLANE)
         self._qpos = self._batch.bind("qpos").reshape(shape)
         self._qvel = self._batch.bind("qvel").reshape(shape)
         self._ctrl = self._batch.bind("ctrl").reshape(shape)
@@ -153,7 +154,13 @@ class PointWorlds:
         self.states = replace(self.states, is_active=is_active)
 
     def step(self, acceleration_mps2: Float[np.ndarray, "B N D"]) -> RobotStates:
-        """Move all robots one window on, u clipped to A_max; ValueError for a wrong u (Eq. 15)."""
+        """Move all robots one window on: p + v Δt, then v + u Δt (Eq. 15).
+
+        Each axis of u is clipped to A_max, and of v to V_max.
+
+        Raises:
+            ValueError: The accelerations u are not one finite vector [m/s²] for each robot.
+        """
         check_accelerations(acceleration_mps2, self.states.position_m.shape)
         if self._mission.physics == "exact":
             self._step_exact(acceleration_mps2)
@@ -234,6 +241,13 @@ def _are_finite(numbers: Float[np.ndarray, "B N D"]) -> bool:
     return True
 
 
+@compiled(makes_arrays=False)
+def next_velocity(v: float, u: float, dt_s: float, limit_mps2: float, limit_mps: float) -> float:
+    """Return a robot's velocity along an axis a window later: v + u Δt, both clipped."""
+    u = min(max(u, -limit_mps2), limit_mps2)
+    return min(max(v + u * dt_s, -limit_mps), limit_mps)
+
+
 @compiled()
 def _kick(
     qpos: Float[np.ndarray, "B N D"],
@@ -252,9 +266,10 @@ def _kick(
     num_missions, num_robots = acceleration.shape[:2]
     for b in range(num_missions):
         for i in range(num_robots):
-            for axis in range(2):
-                u = min(max(acceleration[b, i, axis], -limit_mps2), limit_mps2)
-                v = min(max(ctrl[b, i, axis] + u * dt_s, -limit_mps), limit_mps)
+            for axis in range(PLANE):
+                v = next_velocity(
+                    ctrl[b, i, axis], acceleration[b, i, axis], dt_s, limit_mps2, limit_mps
+                )
                 p = qpos[b, i, axis]
                 while abs(p) > wall_m:
                     edge = wall_m if p > 0 else -wall_m

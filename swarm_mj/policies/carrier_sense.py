@@ -17,7 +17,7 @@ from swarm_mj.policies.about import Information, Leading, Listed, Look, PairMemo
 from swarm_mj.policies.policy import BroadcastPolicy
 from swarm_mj.policies.random_access import RandomTransmission
 from swarm_mj.protocol.packets import Packet, fitting, packet_of
-from swarm_mj.protocol.timestamps import slot_of
+from swarm_mj.protocol.timestamps import slot_at
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.carrier_sensing import Contention, Sensing, usual_busy_dbm
 
@@ -176,11 +176,8 @@ class AgeGainCsma(SensingPolicy):
     def contend(self, views: LocalViews) -> Contention:
         """Return an earlier minislot the more news a robot has; in turns, that of the owner."""
         self._bring_news(views)
-        slot = int(slot_of(views.now)[0])  # the clocks of all missions are alike
-        turn, place = divmod(slot, TURN_EVERY)
-        if place == TURN_EVERY - 1:
-            return in_turn(views, turn)
-        return self._by_news()
+        turn = turn_at(slot_at(views.now[0]))  # the clocks of all missions are alike
+        return self._by_news() if turn is None else in_turn(views, turn)
 
     def _by_news(self) -> Contention:
         """Return an earlier minislot the more news a robot has; with little it has none."""
@@ -201,6 +198,12 @@ class AgeGainCsma(SensingPolicy):
         is_new_to = 1.0 - covered_share(views, self._range_m)
         self._news += (known - self._known) * is_new_to
         self._known = known
+
+
+def turn_at(slot: int) -> int | None:
+    """Return the number of the turn that a slot is, or None if it is for the robots with news."""
+    turn, place = divmod(slot, TURN_EVERY)
+    return turn if place == TURN_EVERY - 1 else None
 
 
 def in_turn(views: LocalViews, turn: int) -> Contention:

@@ -17,7 +17,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
 from swarm_mj.policies.about import Bound, Information, Listed, Look, PairMemory
 from swarm_mj.policies.policy import CentralisedPolicy
-from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, merge_expected, observe_own, rise
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, merge_expected, observe_own, total_rise
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.links import Links, air_of, among, listen
 from swarm_mj.radio.mission_radio import TrueLinks, radio_of
@@ -107,7 +107,7 @@ def packet_gains(sent: Float32[np.ndarray, "N N"], links: Links) -> Float[np.nda
     for i in range(num_robots):
         for j in range(num_robots):
             if links.received_mw[i, j] > 0.0:
-                gains[i, j] = _total_rise(sent[i], sent[j])
+                gains[i, j] = total_rise(sent[i], sent[j])
     return gains
 
 
@@ -216,17 +216,6 @@ def _add_responses(
                 if answer_probability[j] > 0.0:
                     # A response is only sent if the request was decoded.
                     is_sent = probability[answerer[j]]
-                    risen = _total_rise(after[answerer[j]], after[j])
+                    risen = total_rise(after[answerer[j]], after[j])
                     total += answer_probability[j] * is_sent * risen
             value[r] = total
-
-
-# Adding in any order lets the compiler use its vectors. Whole slots add up exactly; expected ones
-# to rounding.
-@compiled(fastmath={"reassoc", "nnan", "nsz"})
-def _total_rise(newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"]) -> float:
-    """Return the rise of T from one row to another, summed over subjects."""
-    total = np.float32(0.0)
-    for k in range(older.shape[0]):
-        total += rise(newer[k], older[k])
-    return float(total)

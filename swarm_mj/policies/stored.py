@@ -219,7 +219,7 @@ def _load_network(
 ) -> None:
     """Load a policy's network if it is a user's own; raise ValueError if it may not be, or differs.
 
-    None are the networks that this process has loaded.
+    `networks` are those that may be imported; None imports nothing, and takes what is loaded.
     """
     own = config.own_network
     if not own:

@@ -50,12 +50,12 @@ def transmit(truth: TrueArrays, radio: RadioNumbers, phase: Phase) -> None:
     """Silence inactive robots, and fill in what the others hear."""
     silence(phase.recipient, truth.is_active)
     sender = decode_strongest(
-        truth.true_m,
-        phase.recipient,
-        radio.received_at_1_m_mw,
-        radio.noise_mw,
-        radio.threshold,
-        radio.hears_while_sending,
+        position_m=truth.true_m,
+        recipient=phase.recipient,
+        received_at_1_m_mw=radio.received_at_1_m_mw,
+        noise_mw=radio.noise_mw,
+        threshold=radio.threshold,
+        hears_while_sending=radio.hears_while_sending,
     )
     for b in range(sender.shape[0]):
         for j in range(sender.shape[1]):  # an array's assignment takes seconds to compile

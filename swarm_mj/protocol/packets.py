@@ -1,4 +1,4 @@
-"""Packets: their fields and widths, and which entries are sent where a slot has no room for all.
+"""Packets: their fields and widths, and how many entries fit into a slot.
 
 The paper's packets hold the sender's buffer: T, M and P of every robot (II-B). The simulation hands
 these numbers over as they are. The widths here are what they would take on the air, and a test
@@ -16,6 +16,7 @@ from swarm_mj.radio.words import bits_per_second
 
 MAX_STDS = 10.0  # more than any error of a position
 BITS_PER_BYTE = 8
+DIGITS = 6  # that count behind the point; smaller parts are the rounding of a product
 POSITION_BITS = 16  # per axis
 VELOCITY_BITS = 8  # per axis
 AGE_BITS = 16  # ages of up to 32,767 windows; older ones count as that old
@@ -120,7 +121,7 @@ def slot_bytes(mission: Mission, taken_s: float = 0.0) -> int | None:
     if mission.bit_rate is None:
         return None
     bits = mission.bit_rate * (mission.slot_s - taken_s)
-    return math.floor(round(bits / BITS_PER_BYTE, 6))
+    return math.floor(round(bits / BITS_PER_BYTE, DIGITS))
 
 
 def fits(packet: Packet, mission: Mission, taken_s: float = 0.0) -> bool:
@@ -144,7 +145,7 @@ def check_fits_slot(
     if rate is not None and capacity is not None and packet.num_bytes > capacity:
         left_s = mission.slot_s - taken_s
         needed = packet.num_bytes * BITS_PER_BYTE / left_s
-        least = math.ceil(round(needed, 6))
+        least = math.ceil(round(needed, DIGITS))
         raise ValueError(
             f"{what} {packet.num_bytes:,} bytes{why}, but a slot holds {capacity:,} bytes at "
             f"{bits_per_second(rate)}; choose a bit rate of {least} or more{otherwise}"

@@ -4,7 +4,7 @@ Index order: `[i, k]` is when robot `k` observed what robot `i` knows of it.
 """
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float, Float32, Int
 
 from swarm_mj.mission.team import SLOTS_PER_WINDOW
 from swarm_mj.system.compiled import compiled
@@ -16,6 +16,11 @@ SLOT_WINDOWS = 1.0 / SLOTS_PER_WINDOW
 def slot_of(t: Float[np.ndarray, "*S"]) -> Int[np.ndarray, "*S"]:
     """Return the slot that begins at t [windows], counted from 0 at the mission's start."""
     return np.rint(t / SLOT_WINDOWS).astype(np.int64)
+
+
+def slot_at(t: float) -> int:
+    """Return the slot that begins at t [windows]: `slot_of` for one time."""
+    return round(t / SLOT_WINDOWS)
 
 
 # The rule of the merge stands here, as a condition and as the rise that follows from it. The loops
@@ -32,6 +37,17 @@ def is_newer(sent: float, held: float) -> bool:
 def rise(sent: np.floating, held: np.floating) -> np.floating:
     """Return the rise of a receiver's timestamp when it decodes a packet."""
     return max(sent - held, np.float32(0.0))
+
+
+# Adding in any order lets the compiler use its vectors. Whole slots add up exactly; expected ones
+# to rounding.
+@compiled(fastmath={"reassoc", "nnan", "nsz"}, makes_arrays=False)
+def total_rise(newer: Float32[np.ndarray, "N"], older: Float32[np.ndarray, "N"]) -> float:
+    """Return the rise of T from one row to another, summed over subjects."""
+    total = np.float32(0.0)
+    for k in range(older.shape[0]):
+        total += rise(newer[k], older[k])
+    return float(total)
 
 
 @compiled()

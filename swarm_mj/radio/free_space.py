@@ -126,12 +126,12 @@ class FreeSpaceRadio:
     ) -> Int[np.ndarray, "B N"]:
         """Return the sender that each robot decodes (Eqs. 1-4); arguments as in `Channel`."""
         return decode_strongest(
-            position_m,
-            recipient,
-            self.received_at_1_m_mw,
-            self.noise_mw,
-            self.threshold,
-            self.recipient_hears_while_sending,
+            position_m=position_m,
+            recipient=recipient,
+            received_at_1_m_mw=self.received_at_1_m_mw,
+            noise_mw=self.noise_mw,
+            threshold=self.threshold,
+            hears_while_sending=self.recipient_hears_while_sending,
         )
 
 

@@ -223,6 +223,7 @@ def _join(k: int, belief: _Belief, slot: Slot) -> None:
                 signal[j] = power
                 if belief.power.shape[0] == 0:  # later interference only adds to this
                     most = (1.0 + MARGIN) * power / belief.threshold - NOISE - total[j]
+                    # Within the least distance powers do not grow: there, none exceeds its bound.
                     near_m2[j] = belief.at_1_m / min(power, most) - MIN_DISTANCE_M**2
             total[j] += power
 

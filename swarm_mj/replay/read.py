@@ -15,6 +15,7 @@ import pyarrow as pa
 from jaxtyping import Float, Int
 from rerun.chunk import RrdReader
 
+from swarm_mj.mission.geometry import PLANE
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.replay import layers, palette
 from swarm_mj.replay.bodies import body_of
@@ -118,7 +119,7 @@ def _footage(facts: Facts, columns: Columns) -> Footage:
     robots = layers.SCENE_ROBOTS.path
     age = _numbers(columns[robots, "age"]).reshape(-1, facts.mission.num_robots)
     centres_m = _numbers(columns[robots, "Cylinders3D:centers"]).reshape(*age.shape, 3)
-    position_m = centres_m[..., :2]
+    position_m = centres_m[..., :PLANE]
     is_on = _numbers(columns[robots, "is_on"]).reshape(age.shape) > 0.0
     velocity_mps = np.zeros((*age.shape, 2))
     height_m = attitude = None
@@ -127,7 +128,7 @@ def _footage(facts: Facts, columns: Columns) -> Footage:
     headings = columns.get((layers.SCENE_HEADINGS.path, "LineStrips3D:strips"))
     if headings is not None:  # teams at rest have none
         start_m, end_m = np.moveaxis(_numbers(headings).reshape(*age.shape, 2, 3), 2, 0)
-        velocity_mps = (end_m - start_m)[..., :2]
+        velocity_mps = (end_m - start_m)[..., :PLANE]
     is_cut_off = np.zeros(age.shape, dtype=bool)
     cut_off = columns.get((robots, "is_cut_off"))
     if cut_off is not None:  # in free space no robot is

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from swarm_mj.mission import Mission
-from swarm_mj.mission.batched_rng import Stream, normal
+from swarm_mj.mission.batched_rng import Stream, correlated, normal
 from swarm_mj.physics.state import RobotStates
 
 
@@ -37,8 +37,7 @@ class Localisation:
         error_m = self._std_m * self._draws.next()
         before_m = self._error_m
         if before_m is not None:
-            # The shares' squares add up to 1, so that errors stay as large as they are.
-            walked_m = self._kept * before_m + math.sqrt(1.0 - self._kept**2) * error_m
+            walked_m = correlated(before_m, error_m, self._kept)
             moves = np.any(states.velocity_mps, axis=2, keepdims=True)
             error_m = np.where(moves, walked_m, before_m)
         self._error_m = error_m

@@ -28,6 +28,7 @@ from swarm_mj.policies.gnn.turns import (
     write_turns,
 )
 from swarm_mj.protocol.buffers import NEVER
+from swarm_mj.protocol.timestamps import rise
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.spatial_reuse import (
     Slot,
@@ -378,8 +379,8 @@ def _rises(own: Timestamps, neighbour: Timestamps, said: Timestamps) -> tuple[fl
     by_packet = zero
     by_both = zero
     for j in range(own.shape[0]):
-        by_packet += max(own[j] - neighbour[j], zero)
-        by_both += max(own[j] - max(neighbour[j], said[j]), zero)
+        by_packet += rise(own[j], neighbour[j])
+        by_both += rise(own[j], max(neighbour[j], said[j]))
     return by_packet / own.shape[0], by_both / own.shape[0]
 
 

@@ -86,7 +86,7 @@ def check_unchanged(features: str, trained_on: Sequence[str], what: str) -> None
 
     Args:
         features: The set's name.
-        trained_on: The names that the network's file holds. None: it is of version 1.0.0, which
+        trained_on: The names that the network's file holds. Empty: it is of version 1.0.0, which
             did not name them; so they are those of the set as it was then.
         what: The network, for the message.
     """

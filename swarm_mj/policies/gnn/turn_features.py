@@ -314,17 +314,17 @@ def _write_teammates(
     """Write ages, and states relative to robot i's own: those of who was never heard of are far."""
     for k in range(len(its)):
         of_k: TurnNode = its[k]
-        known = is_known(own, i, k)
+        is_heard_of = is_known(own, i, k)
         attempt = own.last_attempt[k]
         of_k.is_oneself = k == i
-        of_k.is_known = known
-        of_k.timestamp_age = log_age(now, own.timestamp[k], known)
+        of_k.is_known = is_heard_of
+        of_k.timestamp_age = log_age(now, own.timestamp[k], is_heard_of)
         of_k.attempt_age = log_age(now, own.spoke if k == i else attempt)
         of_k.is_answered = k != i and NEVER < attempt <= own.timestamp[k]
         of_k.is_direct = k != i and own.parent[k] == i
         x = y = x_mps = y_mps = 0.0
         ranges = FAR_RANGES
-        if known:
+        if is_heard_of:
             x = (own.position_m[k, 0] - own.position_m[i, 0]) * per_m
             y = (own.position_m[k, 1] - own.position_m[i, 1]) * per_m
             x_mps = own.velocity_mps[k, 0] - own.velocity_mps[i, 0]
@@ -339,7 +339,7 @@ def _write_teammates(
         of_k.is_near = k != i and ranges <= 1.0
         of_k.velocity_x = x_mps * per_mps
         of_k.velocity_y = y_mps * per_mps
-        may_address[k] = not known or ranges <= ADDRESS_RANGES
+        may_address[k] = not is_heard_of or ranges <= ADDRESS_RANGES
 
 
 @compiled(forceinline=True, makes_arrays=False)
@@ -355,10 +355,10 @@ def _write_counts(
     """Write ranks, and what is the same in all nodes but for turns."""
     num_robots = len(its)
     for k in range(num_robots):
-        unknown: TurnNode = its[k]
-        unknown.is_staler = 0.0
-        unknown.rank = shares[num_known]  # last, and together
-        unknown.nearness = shares[num_known]
+        of_any: TurnNode = its[k]
+        of_any.is_staler = 0.0
+        of_any.rank = shares[num_known]  # last, and together; those of known ones follow
+        of_any.nearness = shares[num_known]
     within_025 = within_05 = within_1 = within_2 = near = 0
     of_3 = of_6 = of_12 = of_24 = 0
     staler = num_known

@@ -11,10 +11,10 @@ from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.policies.about import Information, Leading, Listed, Look, PairMemory
 from swarm_mj.policies.carrier_sense import (
     SENSING_MEMORY,
-    TURN_EVERY,
     SensingPolicy,
     covered_share,
     in_turn,
+    turn_at,
 )
 from swarm_mj.policies.index.decisions import decide, empty_record
 from swarm_mj.policies.index.shipped import shipped_weights
@@ -24,7 +24,7 @@ from swarm_mj.policies.learned import DIGITS
 from swarm_mj.policies.policy import Parameters
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.partial_buffers import choose_entries
-from swarm_mj.protocol.timestamps import slot_of
+from swarm_mj.protocol.timestamps import slot_at
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.carrier_sensing import Contention, usual_busy_dbm
 
@@ -114,12 +114,10 @@ class IndexCsma(SensingPolicy):
 
         A robot that has sent nothing yet is not silent.
         """
-        slot = int(slot_of(views.now)[0])  # the clocks of all missions are alike
+        slot = slot_at(views.now[0])  # the clocks of all missions are alike
         contention = self._by_index(views, slot)
-        turn, place = divmod(slot, TURN_EVERY)
-        if place == TURN_EVERY - 1:
-            return in_turn(views, turn)
-        return contention
+        turn = turn_at(slot)
+        return contention if turn is None else in_turn(views, turn)
 
     def _by_index(self, views: LocalViews, slot: int) -> Contention:
         """Note the slot that has ended, and return the contention of one that is no turn."""

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32, Int, Int8, Int16
 from swarm_mj.mission.geometry import HEIGHT, PLANE
 from swarm_mj.policies.index.weights import MOST, Weights
 from swarm_mj.protocol.buffers import ABSENT
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, rise
+from swarm_mj.protocol.timestamps import SLOT_WINDOWS, rise, total_rise
 from swarm_mj.system.compiled import compiled
 
 MAX_ROWS = 32  # a robot's; of more neighbours, those without a row count as those with one
@@ -108,15 +108,6 @@ def _copy_entries(
         if packet[k] != ABSENT:
             bound[k] = packet[k]
     bound[sender] = KNOWS_ITSELF
-
-
-@compiled(fastmath={"reassoc", "nnan", "nsz"}, makes_arrays=False)
-def lacking(own: Float32[np.ndarray, "N"], bound: Float32[np.ndarray, "N"]) -> float:
-    """Return by how much a packet with this T would raise a bound, sum over entries [windows]."""
-    total = np.float32(0.0)
-    for k in range(len(bound)):
-        total += rise(own[k], bound[k])
-    return float(total)
 
 
 @compiled(makes_arrays=False)
@@ -245,7 +236,7 @@ def _weigh(table: Table, gain: Gain, b: int, i: int, around: Around, weights: We
             continue
         link = chance_within(float(table.ranges[j]), weights.reach[b, 0], REACH_SCALE)
         if link > LEAST_CHANCE:
-            part = link * lacking(table.own, table.bound[b, i, r])
+            part = link * total_rise(table.own, table.bound[b, i, r])
             brought += part
             largest = max(largest, part)
             counted += link
@@ -254,7 +245,7 @@ def _weigh(table: Table, gain: Gain, b: int, i: int, around: Around, weights: We
     if around.num_unknown > 0:
         # Without what was announced, robots that know of one they never heard of would transmit
         # for ever.
-        unheard = SLOT_WINDOWS + lacking(table.own, table.announced[b, i])
+        unheard = SLOT_WINDOWS + total_rise(table.own, table.announced[b, i])
         brought += weights.stranger[b, 0] * around.num_unknown / num_robots * unheard
     gain.total[b, i] = brought
     gain.largest[b, i] = largest

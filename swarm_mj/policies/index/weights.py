@@ -68,9 +68,54 @@ START = Weights(
     threshold=np.array([[-1.2]]),
     softness=np.array([[0.3]]),
     shift_db=np.array([[2.0, 1.5, 0.0, 0.0, 0.5, 0.5]]),
-    in_index=np.array([[0.3, 0.35, 0.2, -0.7, 0.6, 0.3, 0.7, 0.0, -0.7, 0.1]]),
-    in_silence=np.array([[-0.1, -0.1, 0.4, -0.1, 0.0, 0.2, 0.0, 0.0, 0.1, 0.4]]),
-    in_sensing_db=np.array([[0.1, 0.4, 0.9, -0.9, 0.2, -0.5, 0.0, -0.8, -0.3, -0.2]]),
+    in_index=np.array(
+        [
+            Features(
+                neighbours=0.3,
+                since_sent=0.35,
+                edge=0.2,
+                age=-0.7,
+                sent=0.6,
+                decoded=0.3,
+                team=0.7,
+                one_neighbour=0.0,
+                crowd=-0.7,
+                news=0.1,
+            )
+        ]
+    ),
+    in_silence=np.array(
+        [
+            Features(
+                neighbours=-0.1,
+                since_sent=-0.1,
+                edge=0.4,
+                age=-0.1,
+                sent=0.0,
+                decoded=0.2,
+                team=0.0,
+                one_neighbour=0.0,
+                crowd=0.1,
+                news=0.4,
+            )
+        ]
+    ),
+    in_sensing_db=np.array(
+        [
+            Features(
+                neighbours=0.1,
+                since_sent=0.4,
+                edge=0.9,
+                age=-0.9,
+                sent=0.2,
+                decoded=-0.5,
+                team=0.0,
+                one_neighbour=-0.8,
+                crowd=-0.3,
+                news=-0.2,
+            )
+        ]
+    ),
 )
 # The size of a step that is worth a try, number by number.
 STEPS = Weights(

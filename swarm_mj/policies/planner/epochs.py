@@ -28,7 +28,7 @@ from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.planner.snapshots import Snapshots, take_snapshots
 from swarm_mj.policies.policy import TeamView
 from swarm_mj.protocol.buffers import NEVER
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, slot_at
 from swarm_mj.radio.mission_radio import Belief
 
 
@@ -52,7 +52,7 @@ class SnapshotTeam:
         self._settings = settings
         self._window_s = mission.window_s
         self._everyone = np.arange(num_robots)
-        self._first: float | None = None  # when the first decision was asked for [windows]
+        self._first_decision: float | None = None  # when the first decision was asked for [windows]
         self._epoch = -1
         self._begin = 0  # of the epoch, after the first decision [windows]
         self._end = 0  # likewise
@@ -65,9 +65,9 @@ class SnapshotTeam:
 
     def transmits(self, view: TeamView) -> Bool[np.ndarray, "N"]:
         """Return who transmits in this slot; every slot is asked for once, in order."""
-        if self._first is None:
-            self._first = view.now
-        slot = round((view.now - self._first) / SLOT_WINDOWS)
+        if self._first_decision is None:
+            self._first_decision = view.now
+        slot = slot_at(view.now - self._first_decision)
         held = self._held()
         # Packets of the last slot carry snapshots of the epoch that may end now, so they are
         # adopted before the next one begins.
@@ -167,7 +167,7 @@ class SnapshotTeam:
             self._belief,
             self._settings,
             timestamp=nothing if before is None else before.outcome(),
-            now=self._begin + (self._first or 0.0),
+            now=self._begin + (self._first_decision or 0.0),
             is_free=np.array(is_free),
         )
 

@@ -17,7 +17,7 @@ from swarm_mj.policies.planner.assent import Assent, turns_every
 from swarm_mj.policies.planner.plan import Plan
 from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import TeamView
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, SLOTS_PER_WINDOW, slot_of
+from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW, slot_at, slot_of
 from swarm_mj.radio.links import Links
 from swarm_mj.radio.mission_radio import Belief
 from swarm_mj.system.decibels import from_db
@@ -84,7 +84,7 @@ class RestingTeam:
             in_turn: Who transmits by spatial TDMA.
             owns_slot: Whose slot it is by TDMA: one robot.
         """
-        now = round(view.now / SLOT_WINDOWS)
+        now = slot_at(view.now)
         if self._first_slot is None:
             self._first_slot = now
         slot = now - self._first_slot

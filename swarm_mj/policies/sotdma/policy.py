@@ -29,7 +29,7 @@ from swarm_mj.policies.sotdma.frame import Rule, frame_slots
 from swarm_mj.policies.sotdma.slot_table import LONG_AGO, NO_PLACE, SlotTable, place_of
 from swarm_mj.policies.tdma import SpatialTdma, draw_order
 from swarm_mj.protocol.packets import fits, packet_of
-from swarm_mj.protocol.timestamps import SLOT_WINDOWS, slot_of
+from swarm_mj.protocol.timestamps import slot_at, slot_of
 from swarm_mj.protocol.window import LocalViews
 from swarm_mj.radio.mission_radio import Belief, radio_of
 from swarm_mj.radio.power_law import PowerLaw, write_powers
@@ -130,9 +130,11 @@ class SotdmaTeam:
         self._reads_packets = reads_packets
         self._law = belief.law_over_noise(len(order))
         self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
-        self._first_slot: int | None = None  # of the first frame, known from the first decision on
+        self._frames_begin: int | None = (
+            None  # of the first frame, known from the first decision on
+        )
         self.table: SlotTable | None = None  # there is none before the first frame
-        self._first: FirstSlots  # made with the table
+        self._first_slots: FirstSlots  # made with the table
 
     def transmits(
         self, view: TeamView, in_turn: Bool[np.ndarray, "N"], draw: Float[np.ndarray, "N"]
@@ -146,14 +148,14 @@ class SotdmaTeam:
             return in_turn
         is_known = view.is_known | np.eye(len(self._order), dtype=bool)
         if self.table is None:
-            self._first = FirstSlots(
+            self._first_slots = FirstSlots(
                 order=self._order,
                 position_m=view.position_m,
                 is_known=is_known,
                 law=self._law,
                 rule=self._rule,
             )
-            self.table = slot_table.empty_table(self._first.own(), self._rule.num_slots)
+            self.table = slot_table.empty_table(self._first_slots.own(), self._rule.num_slots)
         known = self._last_transmissions(view)
         self._read(self.table, view, known, slot)
         self._choose(self.table, view, is_known, slot)
@@ -169,15 +171,15 @@ class SotdmaTeam:
 
     def _frame_slot(self, now: float) -> int:
         """Return the slot that begins now, counted from the first frame; before it, below 0."""
-        slot = round(now / SLOT_WINDOWS)
-        if self._first_slot is None:
-            self._first_slot = slot + self._rule.first_rounds * len(self._order)
-        return slot - self._first_slot
+        slot = slot_at(now)
+        if self._frames_begin is None:
+            self._frames_begin = slot + self._rule.first_rounds * len(self._order)
+        return slot - self._frames_begin
 
     def _last_transmissions(self, view: TeamView) -> Int[np.ndarray, "N N"]:
         """Return in which slot each robot last transmitted, as each knows; [i, k] is of k."""
         # A robot observes itself as it transmits, so T is the end of that slot.
-        return slot_of(view.timestamp) - 1 - (self._first_slot or 0)
+        return slot_of(view.timestamp) - 1 - (self._frames_begin or 0)
 
     def _read(
         self, table: SlotTable, view: TeamView, known: Int[np.ndarray, "N N"], slot: int
@@ -213,7 +215,7 @@ class SotdmaTeam:
         """Let robot i work out the first slots of those it knows that never announced another."""
         silent = is_known & (table.announced[i] == LONG_AGO)
         silent[i] = False  # it has its own
-        table.slots[i, silent] = self._first.of(i, silent)[silent]
+        table.slots[i, silent] = self._first_slots.of(i, silent)[silent]
 
     def _are_in_need(
         self,

@@ -12,11 +12,11 @@ from swarm_mj.policies.index.table import (
     chance_within,
     empty_gain,
     empty_table,
-    lacking,
     note_and_weigh,
 )
 from swarm_mj.policies.index.weights import START
 from swarm_mj.protocol.buffers import ABSENT
+from swarm_mj.protocol.timestamps import total_rise
 
 RANGE_M = 100.0
 WEIGHTS = START._replace(success=np.array([[0.75]]))
@@ -174,7 +174,9 @@ def test_rows_go_to_the_nearest_and_of_those_who_leave_to_others():
     has_row = np.flatnonzero(robots.table.row[0, 0] != NO_ROW)
     assert has_row.tolist() == list(range(1, MAX_ROWS + 1))
     # Those without a row count as those with one.
-    part = lacking(np.array([20.5, *[19.0] * (num - 1)], np.float32), robots.table.bound[0, 0, 0])
+    part = total_rise(
+        np.array([20.5, *[19.0] * (num - 1)], np.float32), robots.table.bound[0, 0, 0]
+    )
     assert robots.gain.total[0, 0] == pytest.approx((num - 1) * part, rel=3e-3)
     left = robots.table.row[0, 0, 5]
     robots.places[0, 0, 5] = (1.01 * LEFT_BEYOND * RANGE_M, 0.0)

@@ -92,7 +92,7 @@ def test_it_begins_as_spatial_tdma_then_everyone_transmits_once_in_every_frame_i
     turns = transmitters(Swarm(REST, [3]), make_policy("spatial-tdma", REST), FIRST // 2)
     np.testing.assert_array_equal(slots[:FIRST], turns)
     rule = policy._teams[0]._rule
-    assert policy._teams[0]._first_slot == FIRST
+    assert policy._teams[0]._frames_begin == FIRST
     places = np.array([place_of(slot, rule) for slot in range(200 - FIRST)])
     sent = slots[FIRST:, 0]
     frame = np.cumsum(places == 0)[places != NO_PLACE]
