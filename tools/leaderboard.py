@@ -20,7 +20,7 @@ from swarm_mj.cli import main as swarm_mj
 from swarm_mj.cli.study import read_study
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.mission import Mission, paper
-from swarm_mj.policies.about import Information
+from swarm_mj.policies.about import NO_PAYLOAD, Information
 from swarm_mj.policies.registry import POLICIES, flown_name, make_policy
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.packages import asset
@@ -117,7 +117,7 @@ def information_of(policy: str) -> str:
     facts: dict[str, Any] = facts_of(policy, make_policy(policy, mission), mission)
     if facts["is_centralised"]:
         return CENTRE
-    if facts["payload"] != "none":
+    if facts["payload"] != NO_PAYLOAD:
         return CARRIES
     return SENSES if Information.CARRIER_SENSING.label in (facts["beyond_paper"] or ()) else HEARS
 

@@ -52,4 +52,4 @@ def _used(facts: dict[str, Any]) -> str:
 
 
 def _carried(policy: Policy) -> str:
-    return "nothing" if policy.payload == "none" else carried(policy)
+    return carried(policy) if policy.carries_more else "nothing"

@@ -26,6 +26,7 @@ from swarm_mj.cli import script
 from swarm_mj.evaluation.markdown_table import markdown_table
 from swarm_mj.evaluation.results import LARGER_PACKETS
 from swarm_mj.mission import paper
+from swarm_mj.policies.about import NO_PAYLOAD
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.system.exit_codes import DONE, FAILED
 from swarm_mj.system.fields import setting
@@ -157,17 +158,17 @@ def _fact(policy: str, fact: str) -> str:
     mission = paper("random-walk")
     said = facts_of(policy, make_policy(policy, mission), mission)[fact]
     text = ", ".join(said) if isinstance(said, list | tuple) else str(said)
-    return "nothing" if text in ("none", "") else text
+    return "nothing" if text in (NO_PAYLOAD, "") else text
 
 
 def _name(row: dict[str, Any], used: Rows) -> str:
     if head := row.get("head"):
         return head
-    its = [each for each in used if each["policy"] == row["policy"]]
-    more = any(each.get("payload") not in (None, "none") for each in its)
+    flown = [each for each in used if each["policy"] == row["policy"]]
+    more = any(each.get("payload") not in (None, NO_PAYLOAD) for each in flown)
     policy = str(row["policy"])
     own = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else policy
-    versions = {each.get("version") for each in its}
+    versions = {each.get("version") for each in flown}
     called = f"{policy} {versions.pop()}" if len(versions) == 1 else policy
     name = NAMES.get(called, NAMES.get(policy, own))
     return f"{name} ({LARGER_PACKETS})" if more else name

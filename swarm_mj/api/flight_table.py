@@ -11,6 +11,7 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.faults import MIN_SURVIVORS
+from swarm_mj.policies.about import NO_PAYLOAD
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.agreement import AGREED, perfect_rate
 from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, MissionCost
@@ -94,7 +95,7 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
     rows |= _packets(summary)
 
     carried = "the sender's buffer"
-    if summary.payload != "none":
+    if summary.payload != NO_PAYLOAD:
         carried += f" and {summary.payload}"
     rows["packets carry"] = carried
     rate = bits_per_second(BITS_PER_BYTE * summary.bytes_per_second)

@@ -94,7 +94,7 @@ def _print_one(each: dict[str, Any], policy: Policy, mission: Mission) -> None:
         "what it uses": each["uses"] or "it does not say: give its class a text `uses`",
         **_beyond_paper(each),
         "in a window": WINDOWS[each["window"]],
-        "packets carry": T_M_P if policy.payload == "none" else f"{T_M_P}\n{carried(policy)}",
+        "packets carry": f"{T_M_P}\n{carried(policy)}" if policy.carries_more else T_M_P,
         "packet": f"{each['packet_bytes']:,} bytes",
         **{name: as_typed(value) for name, value in each["parameters"].items()},
         "source": each["class"],

@@ -16,6 +16,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.surroundings import OPEN
+from swarm_mj.policies.about import NO_PAYLOAD
 from swarm_mj.protocol.mission_costs import (
     AOI,
     MISSION_COSTS,
@@ -71,7 +72,7 @@ class Result:
     robot: str = later_column(lambda own: own.mission.robot, older=POINT)
     # Of the radio [bit/s]; None: packets of any size fit.
     bit_rate: float | None = later_column(lambda own: own.mission.bit_rate, older=None)
-    # What packets carry beyond T, M and P (II-B): its name, or "none".
+    # What packets carry beyond T, M and P (II-B): its name, or `NO_PAYLOAD`.
     payload: str | None = later_column(lambda own: own.made.payload, older=None)
 
     aoi_mean: float = column(lambda own: own.aoi.mean)
@@ -303,7 +304,7 @@ def statistics_of(result: Result, cost: MissionCost) -> CostStatistics:
 
 def carries_more(result: Result) -> bool:
     """Return whether packets carry more than T, M and P (II-B); older files do not say."""
-    return result.payload not in (None, "none")
+    return result.payload not in (None, NO_PAYLOAD)
 
 
 def has_memory(result: Result) -> bool:

@@ -11,6 +11,7 @@ from typing import Literal, NamedTuple
 
 from swarm_mj.mission import Mission
 
+NO_PAYLOAD = "none"  # the payload of packets that hold T, M and P alone, in a word
 COLOUR = re.compile(r"#[0-9a-f]{6}")
 Marker = Literal[
     "o", "s", "^", "v", ">", "<", "8", "P", "p", "D", "d", "h", "H", "X", "*", ".", "_", "|", "x"
@@ -202,8 +203,8 @@ class About:
 
     @property
     def payload_name(self) -> str:
-        """The payload in a word, `none` if there is none."""
-        return "none" if self.payload is None else self.payload.name
+        """The payload in a word, `NO_PAYLOAD` if there is none."""
+        return NO_PAYLOAD if self.payload is None else self.payload.name
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission import Mission
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.about import About
+from swarm_mj.policies.about import NO_PAYLOAD, About
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.packets import Packet, PacketField, fitting, packet_of
 from swarm_mj.protocol.window import LocalViews
@@ -40,7 +40,7 @@ class Policy:
     about: About | None = None
     is_centralised: bool = False
     uses: str = ""
-    payload: str = "none"
+    payload: str = NO_PAYLOAD
 
     def __init_subclass__(cls, **kwargs: object) -> None:
         super().__init_subclass__(**kwargs)
@@ -103,6 +103,11 @@ class Policy:
         """
         packet = packet_of(mission, self.payload_fields(mission))
         return fitting(packet, mission, type(self).__name__)
+
+    @property
+    def carries_more(self) -> bool:
+        """True if its packets carry more than T, M and P (II-B)."""
+        return self.payload != NO_PAYLOAD
 
     @property
     def parameters(self) -> Parameters:

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import TypeGuard
 
 from swarm_mj.mission import Mission
-from swarm_mj.policies.about import About, Listed, VariantOf
+from swarm_mj.policies.about import NO_PAYLOAD, About, Listed, VariantOf
 from swarm_mj.policies.gnn import feature_sets
 from swarm_mj.policies.gnn.shipped import SHIPPED_GNN
 from swarm_mj.policies.gnn.turn_features import TurnFeatures
@@ -116,7 +116,7 @@ LISTED = _in_order(CLASSES.values())
 POLICIES = tuple(LISTED)
 VARIANTS = _variants()
 # What `--payload` takes. At rest the planner's own is links, which this name stands for as well.
-PAYLOADS = (*(LISTED[name].payload_name for name in VARIANTS), "none")
+PAYLOADS = (*(LISTED[name].payload_name for name in VARIANTS), NO_PAYLOAD)
 FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
 HAVE_PROBABILITY = tuple(
     name for name in POLICIES if issubclass(CLASSES.get(name, Policy), RandomTransmission)
@@ -341,7 +341,7 @@ def with_payload(names: Sequence[str], payload: str) -> list[str]:
 
     Raises ValueError if there is to be none, and none of the policies has a choice.
     """
-    if payload != "none":
+    if payload != NO_PAYLOAD:
         return list(names)
     has_choice = {*VARIANTS, *VARIANTS.values()}
     if not has_choice.intersection(names):

@@ -174,6 +174,7 @@ def test_ii_b_every_named_policy_is_of_one_kind_and_says_what_packets_carry(name
     assert policy.is_centralised == (name in CENTRALISED)
     assert isinstance(policy, DecentralisedPolicy) == (name in DECENTRALISED)
     assert policy.payload == PAYLOAD.get(name, "none")
+    assert policy.carries_more == (name in PAYLOAD)
     assert PAYLOAD["planner"] == "snapshots"
 
 

@@ -40,7 +40,7 @@ def draw_flock(preset: str, policy_name: str, seed: int) -> Figure:
     start = swarm.states
     for _ in rollout(swarm, policy):
         pass
-    carries = "" if policy.payload == "none" else f" ({LARGER_PACKETS})"
+    carries = f" ({LARGER_PACKETS})" if policy.carries_more else ""
     flown = f"{mission.num_robots} robots, policy {policy_name}{carries}, seed {seed}"
     about = f"fig2, preset {preset}: {flown}, {mission.num_windows} windows"
     with styled():
