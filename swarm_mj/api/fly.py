@@ -18,7 +18,7 @@ from swarm_mj.physics.scene import Scene
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy import Policy
 from swarm_mj.policies.policy_arguments import PolicyArguments
-from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.free_space import OwnChannel
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.arguments import check_kind, check_names
 from swarm_mj.system.fields import former_names
@@ -37,7 +37,7 @@ def fly(
     observer: int = 0,
     live: bool | str = False,
     speed: float | None = None,
-    channel: str | Channel | None = None,
+    channel: OwnChannel | None = None,
     controller: str | Controller | None = None,
     scene: str | Scene | None = None,
     pilot: OwnPilot | None = None,

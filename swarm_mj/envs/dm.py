@@ -21,7 +21,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.robots import OwnPilot
 from swarm_mj.physics.scene import Scene, compose
 from swarm_mj.protocol.checks import as_array, checked_robots
-from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.free_space import OwnChannel
 from swarm_mj.simulation.swarm import Swarm
 
 _Task: Any = control.Task  # untyped: pyright reads its abstract methods as returning None
@@ -31,7 +31,7 @@ def make_environment(
     mission: Mission,
     seed: int = 0,
     *,
-    channel: Channel | None = None,
+    channel: OwnChannel | None = None,
     controller: Controller | None = None,
     scene: Scene | None = None,
     pilot: OwnPilot | None = None,

@@ -69,6 +69,9 @@ class VaryingChannel(Protocol):
         ...
 
 
+OwnChannel = Channel | VaryingChannel | str  # in place of the mission's; a text is its name
+
+
 def path_loss_db(distance_m: float, frequency_hz: float) -> float:
     """Return the free-space path loss over a distance [dB] (Eq. 1)."""
     # The paper rounds 20 log10(c / 4 pi), 147.5522: all that sets our powers apart from ns-3's.

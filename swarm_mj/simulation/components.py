@@ -12,7 +12,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.physics.robots import CALLED_AS_PILOT, OwnPilot
 from swarm_mj.physics.scene import Scene
 from swarm_mj.radio.effects import beyond_free_space
-from swarm_mj.radio.free_space import Channel, VaryingChannel
+from swarm_mj.radio.free_space import OwnChannel, VaryingChannel
 from swarm_mj.radio.gain_table import GainTable
 from swarm_mj.system.arguments import check_component, name_of
 from swarm_mj.system.fields import setting
@@ -33,7 +33,7 @@ TABLE = "table:"  # begins the name of a channel that is a table of gains
 class GivenParts(TypedDict, total=False):
     """Keywords of `Swarm`: objects or names, of those kinds alone that are not the mission's."""
 
-    channel: Channel | VaryingChannel | str
+    channel: OwnChannel
     controller: Controller | str
     scene: Scene | str
     pilot: OwnPilot

@@ -30,7 +30,7 @@ from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews, Phase
 from swarm_mj.protocol.window_protocols import RequestResponse, WindowProtocol
 from swarm_mj.radio.carrier_sensing import CarrierSensing, Contention
-from swarm_mj.radio.free_space import Channel, VaryingChannel
+from swarm_mj.radio.free_space import OwnChannel
 from swarm_mj.radio.mission_radio import mission_radio
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.localisation import Localisation
@@ -105,7 +105,7 @@ class Swarm:
         mission: Mission,
         seeds: Sequence[int],
         *,
-        channel: str | Channel | VaryingChannel | None = None,
+        channel: OwnChannel | None = None,
         controller: str | Controller | None = None,
         scene: str | Scene | None = None,
         pilot: OwnPilot | None = None,
