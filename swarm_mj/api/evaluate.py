@@ -3,12 +3,12 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack
+from typing import TYPE_CHECKING, Unpack, cast
 
 from swarm_mj.api.flight_summary import Metrics
 from swarm_mj.api.fly import mission_of, names_of
 from swarm_mj.evaluation.batch import BatchCosts
-from swarm_mj.evaluation.engines import EngineOptions
+from swarm_mj.evaluation.engines import EngineName, EngineOptions
 from swarm_mj.evaluation.flying import fly_study
 from swarm_mj.evaluation.results import Evaluated, Result
 from swarm_mj.evaluation.study import DEFAULT_POLICIES, Study
@@ -228,14 +228,15 @@ def evaluate(
         networks=names_of(networks),
         components=Components(**components),
     )
-    options = EngineOptions(jobs=num_jobs, engine=engine, address=address)
-    flies = options.engine_for(study)
+    check_value(EngineOptions.__dataclass_fields__["engine"], engine)
+    options = EngineOptions(jobs=num_jobs, engine=cast("EngineName", engine), address=address)
+    study_engine = options.engine_for(study)
     needs = study_needs(study, options.jobs_here)
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"
     check_fits(needs, None, way_out, is_forced=False, way_on="")
     costs: dict[int, BatchCosts] = {}
     with memory_errors():
-        fly_study(study, costs, flies, None, quiet_console())
+        fly_study(study, costs, study_engine, None, quiet_console())
     return Evaluation(mission=mission, results=study_results(study, costs, study.header()))
 
 

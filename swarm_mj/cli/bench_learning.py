@@ -11,6 +11,7 @@ from swarm_mj.cli.bench_simulation import Clock, Row, clock_of, in_turn_us, micr
 from swarm_mj.envs.gymnasium_vector import SwarmVectorEnv
 from swarm_mj.learning.ppo import make_model
 from swarm_mj.learning.settings import usual_settings
+from swarm_mj.learning.ways import CreditAssignment
 from swarm_mj.mission import Mission, paper
 from swarm_mj.policies.centralised import RoundRobin
 from swarm_mj.policies.gnn.fast import FastAggregationGnn
@@ -93,7 +94,9 @@ def _forward(network: torch.nn.Module, *inputs: torch.Tensor) -> Callable[[], ob
     return torch.inference_mode()(lambda: network(*inputs))
 
 
-def _training_per_s(credit: str, mission: Mission, threads: int, seconds: float) -> float:
+def _training_per_s(
+    credit: CreditAssignment, mission: Mission, threads: int, seconds: float
+) -> float:
     """Return the team decisions per second of rollouts and the optimisation after each."""
     settings = usual_settings(credit, mission, (mission.num_robots,))
     ppo = settings.ppo

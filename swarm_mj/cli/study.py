@@ -4,7 +4,7 @@ import tomllib
 from collections.abc import Iterable
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any, ClassVar, get_origin
+from typing import Any, ClassVar, Literal, get_args, get_origin
 
 from swarm_mj.cli.evaluate import StudyFlags, run_study
 from swarm_mj.cli.mission_options import OTHERS, missions_given
@@ -26,7 +26,8 @@ from swarm_mj.system.terminal import plain_console
 MAX_BYTES = 1_000_000
 # A flock's velocity variance is its task's cost; that of other tasks, no policy can change.
 COMPARED = (AOI, TASK_COST)
-TAKES = {"run": "FILE.toml", "compare": "BEFORE.parquet AFTER.parquet"}
+StudyAction = Literal["run", "compare"]
+TAKES: dict[StudyAction, str] = {"run": "FILE.toml", "compare": "BEFORE.parquet AFTER.parquet"}
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -38,8 +39,8 @@ class StudyOptions(StudyFlags):
         "(of Mission in Python; of several values, each is flown) and [missions.NAME], which adds "
         f"missions of its own. {StudyFlags.EPILOG}"
     )
-    action: str = setting(
-        help="what to do", metavar="ACTION", choices=tuple(TAKES), is_positional=True
+    action: StudyAction = setting(
+        help="what to do", metavar="ACTION", choices=get_args(StudyAction), is_positional=True
     )
     named: tuple[str, ...] = setting(
         help="a study to run, FILE.toml or a shipped one's name; or two results to compare, each "

@@ -27,6 +27,7 @@ from swarm_mj.learning.settings import (
     usual_index_settings,
     usual_settings,
 )
+from swarm_mj.learning.ways import CreditAssignment
 from swarm_mj.mission import PRESETS, Mission
 from swarm_mj.policies.gnn.feature_sets import (
     FEATURE_SETS,
@@ -56,10 +57,6 @@ PARTS = {  # the dataclasses of settings and their headings in the help, by thei
 }
 
 
-# What counts for the search of an index, beside missions and parts; credit and networks do not.
-OF_INDEX = ("policy", "robots", "missions", "train_windows", "seed", "evaluate_every", "held_out")
-
-
 def _specs() -> dict[str, Field[Any]]:
     """Return the fields that are options, by their dotted place."""
     specs: dict[str, Field[Any]] = {}
@@ -72,6 +69,16 @@ def _specs() -> dict[str, Field[Any]]:
 
 
 SPECS_BY_PLACE = _specs()
+# What counts for the search of an index, beside missions and parts; credit and networks do not.
+OF_INDEX = [
+    SPECS_BY_PLACE["policy"],
+    SPECS_BY_PLACE["robots"],
+    SPECS_BY_PLACE["missions"],
+    SPECS_BY_PLACE["train_windows"],
+    SPECS_BY_PLACE["seed"],
+    SPECS_BY_PLACE["evaluate_every"],
+    SPECS_BY_PLACE["held_out"],
+]
 
 
 def setting_options() -> Iterator[Option]:
@@ -113,7 +120,9 @@ def asked_settings(
     ppo = _part("ppo", given)
     sizes = own.get("robots", (Mission().num_robots,))
     mission, *others = _missions(_part("mission", given), sizes[0])
-    training = usual_settings(own.get("credit_assignment", "robot"), mission, sizes)
+    training = usual_settings(
+        own.get("credit_assignment", Training.credit_assignment), mission, sizes
+    )
     training = replace(training, other_missions=tuple(others))
     if init is not None:
         training = _begun_with(training, init, f"policy {init_path}", given)
@@ -174,9 +183,10 @@ def _index_settings(given: Given) -> Training:
 def check_of_index(given: Given) -> None:
     """Raise ValueError for an option that counts for networks only."""
     for place in given:
-        owner, _, name = place.rpartition(".")
-        if not (owner in ("mission", "components") or (name in OF_INDEX and not owner)):
-            flag = flags_of(SPECS_BY_PLACE[place])[0]
+        owner, _, _ = place.rpartition(".")
+        spec = SPECS_BY_PLACE[place]
+        if owner not in ("mission", "components") and spec not in OF_INDEX:
+            flag = flags_of(spec)[0]
             raise ValueError(f"{flag} is of training a gnn, not of index-csma; leave it out")
 
 
@@ -301,7 +311,7 @@ def _usual(place: str) -> str:
     return f"{robot}, team: {team}"
 
 
-def _usual_of(credit: str, place: str) -> str:
+def _usual_of(credit: CreditAssignment, place: str) -> str:
     value_of = attrgetter(place)
     first, second = _usual_runs(credit)
     usual = value_of(first)
@@ -312,7 +322,7 @@ def _usual_of(credit: str, place: str) -> str:
 
 
 @cache
-def _usual_runs(credit: str) -> tuple[Training, Training]:
+def _usual_runs(credit: CreditAssignment) -> tuple[Training, Training]:
     """Return the usual settings for two missions, which show what depends on the preset."""
     paper = PRESETS["paper"]("stationary")
     reference = PRESETS["reference"]("flocking")

@@ -1,13 +1,17 @@
 """A robot's own credit: what its team's gain would have lost had the robot stayed silent.
 
-The difference reward of Wolpert and Tumer (2001): a window is replayed without the robot, through
-the same channel and by the same protocol. Its sum has the gradient of the team's gain, and a silent
-robot's credit is 0. Replayed with a packet that a silent robot did not send, the window tells what
-it would have been worth (as in Foerster et al., 2018, where a critic guesses it).
+    D_i = sum over windows h < H of [age(without i's packet in window 0) - age(as flown)]
+
+The difference reward D of Wolpert and Tumer (2001), where the gain is minus the age: window 0 is
+replayed without the robot, through the same channel and by the same protocol. Its sum has the
+gradient of the team's gain, and a silent robot's credit is 0. Replayed with a packet that a silent
+robot did not send, the window tells what it would have been worth: age(as flown) - age(with it) (as
+in Foerster et al., 2018, where a critic guesses it).
 
 News matters for longer than a window: it is passed on, and who has it need not hear it again soon.
-So both courses of a window may be followed through those after it, in which everyone decodes whom
-it did in fact. That is an approximation: robots that knew less would have decided otherwise.
+So both courses of a window may be followed through those after it, up to the horizon H, in which
+everyone decodes whom it did in fact. That is an approximation: robots that knew less would have
+decided otherwise.
 """
 
 import copy
@@ -83,7 +87,7 @@ def credits_over(windows: Sequence[ReplayedWindow], horizon: int) -> Credits:
             is_over = window.end == "over"
         stop = min(first + horizon, beyond)
         is_whole[first] = is_over or stop == first + horizon
-        lost = np.zeros(len(window.robot))
+        difference = np.zeros(len(window.robot))  # D_i, or minus D_i of packets put in
         _follow(
             timestamp=window.timestamp,
             after=after[first:stop],
@@ -94,10 +98,10 @@ def credits_over(windows: Sequence[ReplayedWindow], horizon: int) -> Credits:
             mission=window.mission,
             otherwise_heard=window.otherwise_heard,
             otherwise_heard_answer=window.otherwise_heard_answer,
-            lost=lost,
+            difference=difference,
         )
-        gained = 0.0 - lost  # without the sign of -0.0
-        credit[first, window.mission, window.robot] = np.where(window.spoke, lost, gained)
+        negated = 0.0 - difference  # without the sign of -0.0
+        credit[first, window.mission, window.robot] = np.where(window.spoke, difference, negated)
     return Credits(credit=credit, is_whole=is_whole)
 
 
@@ -114,13 +118,13 @@ def replay_otherwise(
     """Replay a window as it was, and once for each robot that speaks or might have spoken.
 
     Args:
-        timestamp: T at the end of the window before [windows], [B, N, N].
-        position_m: Where the robots are, [B, N, D].
-        recipient: Whom each robot addresses, [B, N]; itself is silence.
+        timestamp: T at the end of the window before [windows], [B N N].
+        position_m: Where the robots are, [B N D].
+        recipient: Whom each robot addresses, [B N]; itself is silence.
         channel: A `snapshot_channel` from before the window.
         now: The start of the window [windows], [B].
-        is_active: Robots that have not failed, [B, N]; without it, all count.
-        considered: Whom each robot might have addressed, [B, N]: who does speak, its recipient, and
+        is_active: Robots that have not failed, [B N]; without it, all count.
+        considered: Whom each robot might have addressed, [B N]: who does speak, its recipient, and
             others anyone, or themselves. Without it, `recipient`.
         end: Of the missions, if they end with it.
 
@@ -268,9 +272,9 @@ def _follow(
     mission: Int[np.ndarray, "R"],
     otherwise_heard: Int[np.ndarray, "R N"],
     otherwise_heard_answer: Int[np.ndarray, "R N"],
-    lost: Float[np.ndarray, "R"],
+    difference: Float[np.ndarray, "R"],
 ) -> None:
-    """Follow each window that is otherwise; add up in `lost` by how much ages are higher."""
+    """Follow each window that is otherwise; add up in `difference` by how much ages are higher."""
     other = np.empty(timestamp.shape[1:])
     packet = np.empty(timestamp.shape[1:])
     for r in range(len(mission)):
@@ -282,7 +286,7 @@ def _follow(
             _merge_slot(other, packet, now[n, b] + SLOT_WINDOWS, first)
             _merge_slot(other, packet, now[n, b] + 2 * SLOT_WINDOWS, second)
             risen, is_same = _risen(after[n, b], other, is_active[n, b])
-            lost[r] += risen
+            difference[r] += risen
             if is_same:
                 break  # and so it stays
 

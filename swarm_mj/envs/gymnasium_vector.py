@@ -206,8 +206,8 @@ class SwarmVectorEnv(VectorEnv[Observation, np.ndarray, np.ndarray], EzPickle):
                 self._rngs[env], _ = seeding.np_random(seed)
             begun.append(seed_or_next(seed, self._rngs[env]))
         batch = cast("MissionBatch", self._batches[envs[0]])
-        flies = np.flatnonzero(self._batches == batch)
-        if batch.num_missions != envs.size or not np.array_equal(flies, envs):
+        envs_of_batch = np.flatnonzero(self._batches == batch)
+        if batch.num_missions != envs.size or not np.array_equal(envs_of_batch, envs):
             batch = make_team_batch(self._mission, envs.size, **self._options)
         batch.restart(begun)  # in the swarm that flew exactly these, if there is one
         self._batches[envs] = batch

@@ -6,7 +6,7 @@ through each of them.
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, TypeAlias, get_args
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -26,7 +26,13 @@ from swarm_mj.policies.gnn.graphs import Graphs, check_width
 from swarm_mj.protocol.buffers import NEVER
 from swarm_mj.protocol.checks import checked_robots
 from swarm_mj.protocol.costs import WindowCosts, age_of_information, velocity_variance
-from swarm_mj.protocol.mission_costs import AOI, BY_REWARD, TASK_COST, VELOCITY_VARIANCE
+from swarm_mj.protocol.mission_costs import (
+    AOI,
+    BY_REWARD,
+    TASK_COST,
+    VELOCITY_VARIANCE,
+    Reward,
+)
 from swarm_mj.protocol.packet_counts import no_packets
 from swarm_mj.simulation.components import Components
 from swarm_mj.simulation.swarm import Swarm
@@ -35,7 +41,8 @@ Observation = dict[str, np.ndarray]
 Info = dict[str, Any]
 
 # A team's reward is minus a cost. "credit" is each robot's own.
-REWARDS = (*BY_REWARD, "credit")
+AgentReward: TypeAlias = Literal[Reward, "credit"]
+REWARDS: tuple[AgentReward, ...] = get_args(AgentReward)
 # Training and environments draw seeds from here on, so small ones are left for evaluations.
 FIRST_TRAINING_SEED = 2**40
 LAST_TRAINING_SEED = 2**62
@@ -51,7 +58,7 @@ class MissionBatch:
         num_missions: int = 1,
         *,
         features: str = "extended",
-        reward: str = "aoi",
+        reward: AgentReward = "aoi",
         with_parents: bool = False,
         with_sensors: bool = False,
         components: Components = Components(),
@@ -76,7 +83,7 @@ class MissionBatch:
         self.num_missions = num_missions
         self.shape = (num_missions, mission.num_robots)  # B N
         self.features = features
-        self.reward = reward
+        self.reward: AgentReward = reward
         self.with_parents = with_parents
         self.with_sensors = with_sensors
         self.sensor_limits = _sensor_limits(mission) if with_sensors else np.zeros(0)  # S
@@ -114,10 +121,10 @@ class MissionBatch:
         """Fly one window of Alg. 1, in which each robot addresses a recipient; itself is silence.
 
         Args:
-            recipient: Whom each robot addresses, [B, N], from 0 to N - 1.
+            recipient: Whom each robot addresses, [B N], from 0 to N - 1.
 
         Returns:
-            The reward of each robot, [B, N]: minus the cost that `reward` names, in its unit, the
+            The reward of each robot, [B N]: minus the cost that `reward` names, in its unit, the
             same for a whole team; or, for "credit", the age that its own packets saved, a mean over
             pairs of robots [windows].
 
@@ -141,7 +148,7 @@ class MissionBatch:
         """Fly a window as `step` does, and replay it as it might have been.
 
         Args:
-            recipient: Whom each robot addresses, [B, N], from 0 to N - 1.
+            recipient: Whom each robot addresses, [B N], from 0 to N - 1.
             considered: Whom it might have addressed, where it is silent; see `replay_otherwise`.
 
         Returns:

@@ -2,7 +2,7 @@
 
 import copy
 from numbers import Integral
-from typing import Any, NamedTuple, Unpack, get_args
+from typing import Any, NamedTuple, Unpack, cast, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -11,7 +11,7 @@ from jaxtyping import Float, Float32
 
 from swarm_mj.control.motion import Controller, Costed, controller_of
 from swarm_mj.envs import environment_id
-from swarm_mj.envs.mission_batch import REWARDS, MissionBatch
+from swarm_mj.envs.mission_batch import REWARDS, AgentReward, MissionBatch
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission, Task, TaskAndFields, make_mission
 from swarm_mj.mission.geometry import PLANE
 from swarm_mj.physics.arenas import arena_of
@@ -22,7 +22,7 @@ from swarm_mj.policies.gnn.graphs import REFERENCE_WINDOWS
 from swarm_mj.policies.gnn.packet_memory import LONG_WINDOWS
 from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
-from swarm_mj.radio.free_space import Channel
+from swarm_mj.radio.free_space import OwnChannel
 from swarm_mj.simulation.components import Components
 from swarm_mj.system.arguments import check_choice
 
@@ -54,7 +54,7 @@ class BatchOptions(TaskAndFields, total=False):
     reward: str
     with_parents: bool
     with_sensors: bool
-    channel: Channel | str | None
+    channel: OwnChannel | None
     controller: Controller | str | None
     scene: Scene | str | None
     pilot: OwnPilot | None
@@ -69,7 +69,7 @@ def make_batch(
     reward: str = "aoi",
     with_parents: bool = False,
     with_sensors: bool = False,
-    channel: Channel | str | None = None,
+    channel: OwnChannel | None = None,
     controller: Controller | str | None = None,
     scene: Scene | str | None = None,
     pilot: OwnPilot | None = None,
@@ -113,7 +113,7 @@ def make_batch(
     # Copies: a component may draw or remember, and another environment may be given the same one.
     components = copy.deepcopy(components.made(mission))
     arena_of(mission)  # refuses one that is not there
-    _check_reward(reward, mission, components.controller)
+    paid = _checked_reward(reward, mission, components.controller)
     if not isinstance(features, str):  # stored policies keep the name
         raise TypeError(f'features must be a name, such as "module:Name", not {features!r:.80}')
     if is_own_set(features):
@@ -122,7 +122,7 @@ def make_batch(
         mission,
         num_missions,
         features=features,
-        reward=reward,
+        reward=paid,
         with_parents=with_parents,
         with_sensors=with_sensors,
         components=components,
@@ -142,20 +142,23 @@ def make_team_batch(
     return batch
 
 
-def _check_reward(reward: str, mission: Mission, controller: Controller | None) -> None:
+def _checked_reward(reward: str, mission: Mission, controller: Controller | None) -> AgentReward:
+    """Return a reward that goes with a mission; raise ValueError for any other."""
     check_choice("reward", reward, REWARDS)
-    if reward == "task-cost" and not isinstance(controller or controller_of(mission), Costed):
+    paid = cast("AgentReward", reward)
+    if paid == "task-cost" and not isinstance(controller or controller_of(mission), Costed):
         raise ValueError(
             f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "
             "another task, or reward aoi"
         )
-    if reward == "credit":
+    if paid == "credit":
         check_whole("reward credit", mission)
         if mission.clocks_differ:
             raise ValueError(
                 "reward credit replays windows one by one, which takes a common clock; choose "
                 "another reward (credit team), or clock offset and drift 0"
             )
+    return paid
 
 
 def robot_spaces(batch: MissionBatch) -> tuple[spaces.Space[Any], spaces.Space[Any]]:

@@ -5,7 +5,7 @@ An environment is one robot, or one team. All missions begin and end together.
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Unpack
+from typing import Any, Unpack, cast
 
 import numpy as np
 import stable_baselines3
@@ -25,7 +25,7 @@ from swarm_mj.envs.options import (
     robot_spaces,
     team_spaces,
 )
-from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
+from swarm_mj.envs.vec_env import AGENTS, Agent, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import Activation, MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
@@ -75,6 +75,7 @@ def make_vec_env(
         >>> model = PPO("MultiInputPolicy", make_vec_env("flocking", 4, num_robots=10, seed=1))
     """
     check_choice("agent", agent, AGENTS)
+    chosen = cast("Agent", agent)
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
     if "render_mode" in options:
@@ -83,13 +84,13 @@ def make_vec_env(
             "swarm_mj.fly(..., policy=swarm_mj.envs.sb3.Flown(model)), or draw the environment "
             'gymnasium.make(..., render_mode="rgb_array")'
         )
-    if agent == "robot":
+    if chosen == "robot":
         batch = make_batch(mission, num_missions, **options)
         observation_space, action_space = robot_spaces(batch)
     else:
         batch = make_team_batch(mission, num_missions, **options)
         observation_space, action_space = team_spaces(batch)
-    env = SwarmVecEnv([batch], agent, observation_space, action_space)
+    env = SwarmVecEnv([batch], chosen, observation_space, action_space)
     env.seed(seed)
     return env
 

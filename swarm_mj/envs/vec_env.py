@@ -6,7 +6,7 @@ and in where missions end.
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -18,7 +18,8 @@ from stable_baselines3.common.vec_env.base_vec_env import VecEnvIndices, VecEnvS
 from swarm_mj.envs.mission_batch import MissionBatch, Observation, seed_or_next, seeds_from
 from swarm_mj.protocol.checks import as_array, checked_robots
 
-AGENTS = ("robot", "team")  # what an environment is
+Agent = Literal["robot", "team"]  # what an environment is
+AGENTS: tuple[Agent, ...] = get_args(Agent)
 
 
 class BatchVecEnv(VecEnv):
@@ -32,13 +33,13 @@ class BatchVecEnv(VecEnv):
     def __init__(
         self,
         batches: Sequence[MissionBatch],
-        agent: str,
+        agent: Agent,
         observation_space: spaces.Space,
         action_space: spaces.Space,
     ) -> None:
         """Take missions that have not begun, and whether an agent is a robot or a team."""
         self.batches = list(batches)
-        self.agent = agent
+        self.agent: Agent = agent
         self.render_mode = None
         sizes = [batch.num_missions * self._per_mission(batch) for batch in batches]
         ends = np.cumsum(sizes).tolist()
@@ -55,8 +56,8 @@ class BatchVecEnv(VecEnv):
         reward = np.zeros(self.num_envs, np.float32)
         done = np.zeros(self.num_envs, np.bool_)
         recipients = self._recipients()  # of all batches: if one is bad, none moves
-        for batch, envs, recipient in zip(self.batches, self._envs, recipients, strict=True):
-            paid = self._fly(batch, envs, recipient)
+        for n, (batch, envs) in enumerate(zip(self.batches, self._envs, strict=True)):
+            paid = self._fly(n, recipients[n])
             reward[envs] = paid[:, : self._per_mission(batch)].ravel() / self.reward_unit
             done[envs] = batch.is_over
         # Of this window: a restart, below, forgets them.
@@ -112,12 +113,9 @@ class BatchVecEnv(VecEnv):
     def _per_mission(self, batch: MissionBatch) -> int:
         return batch.mission.num_robots if self.agent == "robot" else 1
 
-    def _fly(
-        self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
-    ) -> Float[np.ndarray, "B N"]:
-        """Fly one window of a batch, whose environments are these; return the robots' rewards."""
-        del envs
-        return batch.step(recipient)
+    def _fly(self, n: int, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+        """Fly one window of batch n; return the robots' rewards."""
+        return self.batches[n].step(recipient)
 
     @abstractmethod
     def _begin(self, n: int) -> None:

@@ -17,7 +17,7 @@ from itertools import islice
 from multiprocessing import get_context
 from pathlib import Path
 from tempfile import TemporaryDirectory, mkdtemp
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from typing import Any, Literal, Protocol, TypeVar, get_args, runtime_checkable
 
 from swarm_mj.evaluation.study import Study
 from swarm_mj.policies.registry import stored_policies
@@ -33,6 +33,7 @@ Work = Callable[[Piece], Product]
 Done = Generator[tuple[int, Product]]  # pieces' indices and products
 Share = Sequence[tuple[int, Piece]]  # a job's pieces, with their indices
 Returned = list[tuple[int, Product]] | Exception  # a job's products, or what went wrong
+EngineName = Literal["local", "ray", "slurm"]
 
 # Jobs share the machine's cores, so none starts threads of its own. And none draws: MuJoCo need not
 # look for a window system, which it does by a program that complains if it is left.
@@ -271,8 +272,8 @@ class EngineOptions:
     """Who flies a study's missions."""
 
     jobs: int = setting(1, "how many at once", low=1, high=256, is_common=True, group=PROCESSES)
-    engine: str = setting(
-        "local", "who starts them", choices=("local", "ray", "slurm"), group=PROCESSES
+    engine: EngineName = setting(
+        "local", "who starts them", choices=get_args(EngineName), group=PROCESSES
     )
     address: str | None = setting(
         None, "a running Ray's", metavar="auto|HOST:PORT", group=PROCESSES

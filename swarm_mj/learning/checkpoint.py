@@ -20,7 +20,7 @@ from stable_baselines3 import PPO
 from stable_baselines3.common.vec_env import VecNormalize
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import policy_of
+from swarm_mj.learning.ppo import networks_of
 from swarm_mj.learning.selection import Columns, Progress, candidates, curve_row_of
 from swarm_mj.learning.settings import Training
 from swarm_mj.policies.gnn.feature_sets import check_unchanged, known_names
@@ -139,7 +139,7 @@ def restore(state: Mapping[str, Any], model: PPO) -> tuple[Progress, Networks]:
     num_rollouts = progress.decisions // (env.num_teams * model.n_steps)
     networks = Networks()
     for row in candidates(progress.curve):
-        network = policy_of(model).acting_network()
+        network = networks_of(model).acting_network()
         network.load_state_dict(state["candidates"][row.decisions])
         networks[row.decisions] = network
     model.policy.load_state_dict(state["weights"])

@@ -35,22 +35,23 @@ class RowCredits(NamedTuple):
 class GraphVecEnv(BatchVecEnv):
     """Environments for PPO over the Aggregation GNN, per robot or per team by its credit.
 
-    Per robot, the reward is the robot's credit, over the number of pairs, and then by what credits
-    of its kind of mission usually are if they are scaled; where packets are considered, it is 0,
-    and `take_credits` returns the credits. Per team, it is the
-    negative mean age of information over the mission's duration, or the negative velocity
-    variance, as in Fig. 6. Smaller teams are padded: per team with robots that do not exist, which
-    are silent and see nothing.
+    Per robot, the reward is the robot's credit over the number of pairs, divided by what is usual
+    in its kind of mission if credits are scaled. Where packets are considered, the reward is 0, and
+    `take_credits` returns the credits. Per team, it is the negative mean age of information over
+    the mission's duration, or the negative velocity variance, as in Fig. 6.
+
+    Smaller teams are padded: per team with robots that do not exist, which are silent and see
+    nothing.
 
     Attributes:
         recalls: Asks what the network remembers since its last decision, [E *robots H]; None unless
             it has a memory.
-        considers: Asks whom robots might have addressed in their last decision, [E], if those
-            packets are to have credits as well; None if not.
+        considered_recipient: Asks whom robots might have addressed in their last decision, [E], if
+            those packets are to have credits as well; None if not.
     """
 
     recalls: Callable[[], np.ndarray] | None = None
-    considers: Callable[[], np.ndarray] | None = None
+    considered_recipient: Callable[[], np.ndarray] | None = None
 
     def __init__(self, training: Training, rng: np.random.Generator) -> None:
         """Begin missions, whose seeds `rng` draws; the first ones are cut off at different windows.
@@ -127,8 +128,8 @@ class GraphVecEnv(BatchVecEnv):
     ) -> Observation:
         """Begin missions, batch by batch, and fly them as recorded; return what is seen then."""
         begun = zip(self.batches, seeds, last_windows, recipients, strict=True)
-        for batch, its_seeds, last_window, flown in begun:
-            batch.restart(its_seeds, last_window)
+        for batch, batch_seeds, last_window, flown in begun:
+            batch.restart(batch_seeds, last_window)
             for recipient in flown.astype(np.int64):
                 batch.fly(recipient)
         self._forget_windows()
@@ -144,21 +145,24 @@ class GraphVecEnv(BatchVecEnv):
             remembered = self.recalls()
             self.memory[:] = remembered if self.agent == "robot" else remembered[self._is_robot]
         seen, reward, done, infos = super().step_wait()
-        if self.considers is None:
+        if self.considered_recipient is None:
             for scale, envs in zip(self._scales, self._envs, strict=True):
                 if scale is not None:
                     reward[envs] = scale.divided(reward[envs])
         return seen, reward, done, infos
 
     def take_credits(self, horizon: int) -> RowCredits:
-        """Return the credits of the windows flown since they were last taken; see `considers`."""
+        """Return the credits of the windows flown since they were last taken.
+
+        There are some where `considered_recipient` is asked.
+        """
         num_windows = len(self._windows[0])
         credit = np.zeros((num_windows, self.num_envs), np.float32)
         is_whole = np.zeros(credit.shape, np.bool_)
         for batch, windows, envs in zip(self.batches, self._windows, self._envs, strict=True):
-            its = batch.mean_credits(windows, horizon)
-            credit[:, envs] = its.credit.reshape(num_windows, -1)
-            is_whole[:, envs] = its.is_whole[:, None]
+            found = batch.mean_credits(windows, horizon)
+            credit[:, envs] = found.credit.reshape(num_windows, -1)
+            is_whole[:, envs] = found.is_whole[:, None]
             windows.clear()
         for window in range(num_windows):  # outside: a scale forgets by windows, not by batches
             for scale, envs in zip(self._scales, self._envs, strict=True):
@@ -167,14 +171,12 @@ class GraphVecEnv(BatchVecEnv):
                     credit[window, envs] = scale.divided(credit[window, envs])
         return RowCredits(credit=credit, is_whole=is_whole)
 
-    def _fly(
-        self, batch: MissionBatch, envs: slice, recipient: Int[np.ndarray, "B N"]
-    ) -> Float[np.ndarray, "B N"]:
-        if self.considers is None:
-            return batch.step(recipient)
-        considered = self.considers()[envs].reshape(batch.shape)
-        its = self.batches.index(batch)
-        self._windows[its].append(batch.fly_for_credit(recipient, considered))
+    def _fly(self, n: int, recipient: Int[np.ndarray, "B N"]) -> Float[np.ndarray, "B N"]:
+        if self.considered_recipient is None:
+            return super()._fly(n, recipient)
+        batch = self.batches[n]
+        considered = self.considered_recipient()[self._envs[n]].reshape(batch.shape)
+        self._windows[n].append(batch.fly_for_credit(recipient, considered))
         return np.zeros(batch.shape)
 
     def _begin(self, n: int) -> None:

@@ -65,13 +65,13 @@ class Flights:
     total: int = 1  # flights, at most
     num_windows: int = 0  # flown
 
-    def fly(self, policy_of: MakePolicy, first_seed: int, num_missions: int) -> CostsByKind:
+    def fly(self, make_flown: MakePolicy, first_seed: int, num_missions: int) -> CostsByKind:
         """Fly as many missions of each kind, from a seed on; return their costs."""
         flown: CostsByKind = []
         for mission in self.training.kinds:
             seeds = range(first_seed, first_seed + num_missions)
             swarm = Swarm(mission, seeds, **self.training.components.given)
-            flown.append(costs_of(swarm, self._reported(rollout(swarm, policy_of(mission)))))
+            flown.append(costs_of(swarm, self._reported(rollout(swarm, make_flown(mission)))))
         return flown
 
     def _reported(self, flown: Iterator[WindowRecord]) -> Iterator[WindowRecord]:
@@ -114,8 +114,8 @@ def evaluate(
         the news is on the same missions, with its standard error.
     """
     flights = Flights(training=training, on_window=on_window)
-    flies = partial(held_out_policy, training, acting)
-    flown = flights.fly(flies, HELD_OUT_SEED, training.held_out)
+    make_acting = partial(held_out_policy, training, acting)
+    flown = flights.fly(make_acting, HELD_OUT_SEED, training.held_out)
     ages = _samples(flown, AOI)
     behind: Columns = {}
     for name in selection.COMPARED:
@@ -161,23 +161,23 @@ def choose(
     flights = Flights(training=training, on_window=on_window, total=len(rows) + OTHER_FLIGHTS)
     size = selection.num_missions(training, run_decisions, flights.total)
 
-    def flies(row: CurveRow) -> MakePolicy:
+    def maker_of(row: CurveRow) -> MakePolicy:
         return partial(held_out_policy, training, candidates[row.decisions])
 
     def objective(row: CurveRow) -> float:
-        return _means(training, flights.fly(flies(row), CHOICE_SEED, size)).objective
+        return _means(training, flights.fly(maker_of(row), CHOICE_SEED, size)).objective
 
     kept = min(rows, key=objective) if len(rows) > 1 else rows[0]
-    costs = flights.fly(flies(kept), TEST_SEED, size)
+    costs = flights.fly(maker_of(kept), TEST_SEED, size)
     own = _samples(costs, training.cost)
     compared: dict[str, MakePolicy] = {}
     for name in selection.references_flown(training):
         compared[name] = partial(make_policy, name)
     if kept is not curve[0]:
-        compared["first"] = flies(curve[0])
+        compared["first"] = maker_of(curve[0])
     others: dict[str, Cost] = {}
-    for name, policy_of in compared.items():
-        samples = _samples(flights.fly(policy_of, TEST_SEED, size), training.cost)
+    for name, make_compared in compared.items():
+        samples = _samples(flights.fly(make_compared, TEST_SEED, size), training.cost)
         others[name] = _compared(samples, own)
     choice = Choice(
         decisions=kept.decisions,

@@ -67,9 +67,9 @@ def training_curve(training: Training, rows: Sequence[CurveRow]) -> "TrainingCur
         sems = [row.costs.aoi_sem or 0.0 for row in rows]
     references: dict[str, float] = {}
     for name in selection.COMPARED:
-        its = rows[-1].references.get(selection.column(cost, name))
-        if its is not None:
-            references[name] = its
+        reference = rows[-1].references.get(selection.column(cost, name))
+        if reference is not None:
+            references[name] = reference
     return TrainingCurve(
         title=cost.label,
         digits=cost.digits,

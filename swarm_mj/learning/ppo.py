@@ -40,7 +40,7 @@ class DevicePpo(PPO):
         self._move(self.optimises_on)
         try:
             super().train()
-            policy_of(self).take_average()
+            networks_of(self).take_average()
         finally:
             self._move(CPU)
 
@@ -78,11 +78,11 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
     """
     torch.set_num_threads(training.threads)  # sums that are divided among them round differently
     ppo = training.ppo
-    considers = training.considers_speech
     graphs = GraphVecEnv(training, np.random.default_rng(training.seed))
     env: VecEnv = graphs
     if training.reward == "velocity-variance":  # as in the authors' code
         env = VecNormalize(env, norm_obs=False, norm_reward=True, gamma=ppo.discount)
+    buffer_class = SpeechRolloutBuffer if training.considers_speech else DictRolloutBuffer
     with warnings.catch_warnings():
         warnings.filterwarnings("ignore", "You have specified a mini-batch size")  # one is smaller
         model = DevicePpo(
@@ -101,18 +101,18 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
             max_grad_norm=ppo.max_gradient_norm,
             seed=training.seed % 2**32,  # NumPy's global generator takes no larger one
             device=CPU,
-            normalize_advantage=not considers,  # a credit's zero means something
-            rollout_buffer_class=SpeechRolloutBuffer if considers else DictRolloutBuffer,
+            normalize_advantage=not training.considers_speech,  # a credit's zero means something
+            rollout_buffer_class=buffer_class,
             policy_kwargs={"training": training, "optimizer_kwargs": {"eps": ppo.adam_epsilon}},
         )
     if training.own_network:
-        check_one_by_one(policy_of(model).network, training.own_network)
+        check_one_by_one(networks_of(model).network, training.own_network)
     if graphs.memory is not None:
-        graphs.recalls = policy_of(model).recalled
-    if considers:
+        graphs.recalls = networks_of(model).recalled
+    if training.considers_speech:
         assert isinstance(model.rollout_buffer, SpeechRolloutBuffer)
-        graphs.considers = policy_of(model).considered_recipient
-        model.rollout_buffer.considers = policy_of(model).considered
+        graphs.considered_recipient = networks_of(model).considered_recipient
+        model.rollout_buffer.considered = networks_of(model).considered
         model.rollout_buffer.takes_credits = partial(graphs.take_credits, ppo.horizon)
     model.optimises_on = optimising_device(device)
     # By optimiser steps, not by PPO's share of a budget, which a resumed run may raise.
@@ -120,7 +120,7 @@ def make_model(training: Training, device: Device = "cpu") -> PPO:
     return model
 
 
-def policy_of(model: PPO) -> "GnnActorCritic":
+def networks_of(model: PPO) -> "GnnActorCritic":
     """Return a model's networks."""
     assert isinstance(model.policy, GnnActorCritic)
     return model.policy
@@ -373,14 +373,14 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
     nothing reads without discount, are learned from these rows, too.
 
     Attributes:
-        considers: Asks for what is considered in the window that is added.
+        considered: Asks for what is considered in the window that is added.
         takes_credits: Asks for the credits of the rollout's windows.
         weights: Those of credits, by window and row.
         done_log_probs: Log-probabilities of what robots did, likewise.
         is_whole: Whether a row's credit is over the whole horizon, likewise; others teach nothing.
     """
 
-    considers: Callable[[], Considered]
+    considered: Callable[[], Considered]
     takes_credits: Callable[[], RowCredits]
 
     def reset(self) -> None:
@@ -400,7 +400,7 @@ class SpeechRolloutBuffer(DictRolloutBuffer):
         log_prob: Tensor,
     ) -> None:
         """Add a window, as the base does, with what is considered in place of what was done."""
-        considered = self.considers()
+        considered = self.considered()
         self.weights[self.pos] = considered.weight.numpy()
         self.done_log_probs[self.pos] = considered.log_p.numpy()
         action = considered.recipient.numpy()[:, None]

@@ -180,9 +180,9 @@ class Session(ABC):
         decisions = progress.decisions
         acting = self._acting()
         try:
-            flies_others = partial(self._report, "Flying others")
             if not progress.curve and not progress.references:
-                progress.references = held_out.fly_references(training, flies_others)
+                on_window = partial(self._report, "Flying others")
+                progress.references = held_out.fly_references(training, on_window)
             self._count_time()
             means = progress.since_evaluation.means()
             begun = progress.minutes

@@ -43,32 +43,14 @@ MAX_DECISIONS = 10**12
 
 @dataclass(frozen=True, kw_only=True)
 class PpoSettings:
-    """PPO, in stable-baselines3's terms; the defaults are those of credit per robot.
+    """PPO, in stable-baselines3's terms; each field says its meaning and its range.
 
-    Args:
-        learning_rate: Of Adam, at the start.
-        decay: By what the learning rate is multiplied every `decay_steps`, from 0 to 1.
-        decay_steps: Optimiser steps between two decays.
-        least_share: The share of `learning_rate` below which it does not decay.
-        num_steps: Windows of each mission in a rollout.
-        num_minibatches: Into how many a rollout is divided.
-        num_epochs: Passes over a rollout.
-        horizon: Over how many windows a packet's credit is summed up, its own included; at most
-            `num_steps`.
-        discount: Gamma; 0 pays a packet its own credit alone, not what later packets earn.
-        gae_lambda: Lambda of the generalised advantage estimate.
-        clip: By how much the probability ratio may differ from 1.
-        clips_value: Whether values are clipped by the same number.
-        entropy: Weight of the entropy bonus.
-        value: Weight of the value's squared error.
-        max_gradient_norm: The norm to which gradients are clipped.
-        adam_epsilon: Adam's epsilon.
-        considered: How many packets have a credit for each that is sent, without discount: robots
-            might have sent the others.
-        kept: The weight of older weights in their average, which flies; 0 is none.
+    The defaults are those of credit per robot, except for `horizon`: `usual_settings` makes it
+    `USUAL_HORIZON`, but stored runs that say nothing of it had 1.
 
     Raises:
-        ValueError: A value is not of its kind, or out of its range.
+        ValueError: A value is not of its kind or out of its range, or `horizon` is longer than
+            `num_steps`.
 
     Example:
         >>> PpoSettings(learning_rate=3e-4).num_epochs
@@ -82,8 +64,8 @@ class PpoSettings:
         low=1e-9,
         high=1.0,
     )
-    decay: float = setting(0.95, low=0.0, high=1.0)  # of the learning rate ...
-    decay_steps: int = setting(200, low=1, high=10**9)  # ... in this many optimiser steps ...
+    decay: float = setting(0.95, low=0.0, high=1.0)  # the learning rate is multiplied by it ...
+    decay_steps: int = setting(200, low=1, high=10**9)  # ... every this many optimiser steps ...
     least_share: float = setting(0.03, low=0.0, high=1.0)  # ... but not below this share of it
     num_steps: int = setting(
         16,
@@ -98,7 +80,7 @@ class PpoSettings:
     )
     num_epochs: int = setting(2, "passes over a rollout", low=1, high=1000)
     # News is passed on, and spares others repeating it: its worth shows later. Runs whose settings
-    # say nothing of it had a horizon of 1.
+    # say nothing of it had a horizon of 1. It is at most a rollout.
     horizon: int = setting(
         1,
         "windows over which a packet's credit is summed up, from its own on",
@@ -114,15 +96,18 @@ class PpoSettings:
         low=0.0,
         high=1.0,
     )
-    gae_lambda: float = setting(0.9, low=0.0, high=1.0)
-    clip: float = setting(0.2, low=1e-12, high=1e6)  # of the probability ratio
+    gae_lambda: float = setting(0.9, low=0.0, high=1.0)  # of the generalised advantage estimate
+    clip: float = setting(0.2, low=1e-12, high=1e6)  # how far the probability ratio may be from 1
     clips_value: bool = False  # by the same number
     entropy: float = setting(0.002, "weight of the entropy bonus", low=0.0, high=10.0)
     value: float = setting(0.5, low=0.0, high=1.0)  # weight of the value's squared error
-    max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)
+    max_gradient_norm: float = setting(0.5, low=1e-12, high=1e6)  # to which gradients are clipped
     adam_epsilon: float = setting(1e-6, low=1e-12, high=1e6)
-    considered: float = setting(5.0, low=1.0, high=1000.0)  # packets, for each that is sent
-    kept: float = setting(0.95, low=0.0, high=0.9999)  # of the average, with each rollout
+    # Packets that have a credit, for each that is sent, without discount: robots might have sent
+    # the others.
+    considered: float = setting(5.0, low=1.0, high=1000.0)
+    # The share of the average of weights, which flies, that each rollout keeps; 0: no average.
+    kept: float = setting(0.95, low=0.0, high=0.9999)
 
     def __post_init__(self) -> None:
         check(self)
@@ -182,7 +167,8 @@ ROBOTS_NETWORK = GnnShape(
 class Training:
     """A training run: the same settings make the same policy on the same machine.
 
-    The defaults are those of credit per robot, made to learn in minutes.
+    The defaults are those of credit per robot, made to learn in minutes, except for the horizon of
+    `ppo`: see `PpoSettings`.
 
     Args:
         policy: "gnn", a graph neural network that PPO trains, or "index-csma", whose numbers are
@@ -469,7 +455,9 @@ def usual_index_settings(mission: Mission, robots: Sequence[int], seed: int = 0)
     )
 
 
-def usual_settings(credit: str, mission: Mission, robots: Sequence[int], seed: int = 0) -> Training:
+def usual_settings(
+    credit: CreditAssignment, mission: Mission, robots: Sequence[int], seed: int = 0
+) -> Training:
     """Return the usual settings of credit per `robot` or per `team`, the paper's way (III-C).
 
     Args:

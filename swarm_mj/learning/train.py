@@ -16,7 +16,7 @@ from swarm_mj.learning.held_out import Acting
 from swarm_mj.learning.index_session import IndexSession
 from swarm_mj.learning.live import LiveTraining
 from swarm_mj.learning.loggers import Guarded, Logger
-from swarm_mj.learning.ppo import make_model, mean_entropy, policy_of
+from swarm_mj.learning.ppo import make_model, mean_entropy, networks_of
 from swarm_mj.learning.run_folder import CHECKPOINT, INIT, SETTINGS, TrainingRun
 from swarm_mj.learning.selection import Listener, Progress
 from swarm_mj.learning.session import Session, record_evaluation
@@ -60,14 +60,14 @@ class TrainingSession(Session, BaseCallback):
             path = own if own.exists() else run.init
             init = read_policy(path)
             _, config = init
-            its = (config.network, config.own_network)
-            if its != (run.training.network, run.training.own_network):
+            stored = (config.network, config.own_network)
+            if stored != (run.training.network, run.training.own_network):
                 whose = "the run that begins with it"
                 raise ValueError(f"policy {path} has another network than {whose}")
         self._begin()
         if init is not None:
             network, config = init
-            policy_of(self.ppo).take_acting_network(network)
+            networks_of(self.ppo).take_acting_network(network)
             if not own.exists():
                 save_gnn(own, network, config)
         self.ppo.set_logger(configure(str(folder / run_folder.TENSORBOARD), ["tensorboard"]))
@@ -118,10 +118,10 @@ class TrainingSession(Session, BaseCallback):
         self.ppo.logger.close()
 
     def _acting(self) -> Network:
-        return policy_of(self.ppo).acting_network()
+        return networks_of(self.ppo).acting_network()
 
     def _write_checkpoint(self) -> None:
-        networks = {at: its for at, its in self._kept.items() if isinstance(its, Network)}
+        networks = {at: net for at, net in self._kept.items() if isinstance(net, Network)}
         path = self._folder / CHECKPOINT
         checkpoint.save(path, self._training, self.ppo, self.progress, networks)
 

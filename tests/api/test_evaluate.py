@@ -90,6 +90,7 @@ def test_it_shows_itself_as_the_table(found, monkeypatch):
         ("tdma", {"num_missions": 0}, "num_missions must be a whole number from 1 to 100000, not"),
         ("gnn", {"features": "mine:Feat"}, "on the features mine:Feat; leave them out"),
         ("tdma", {"num_jobs": 0}, "num_jobs must be a whole number from 1 to 256, not 0"),
+        ("tdma", {"engine": "rya"}, "engine must be one of local, ray, slurm, not 'rya'; did you"),
         ("tdma", {"baseline": "mst"}, "baseline must be one of the policies evaluated"),
     ],
 )

@@ -8,7 +8,7 @@ import torch
 from torch.distributions import Categorical
 
 from swarm_mj.learning.graph_vec_env import env_of
-from swarm_mj.learning.ppo import draw, make_model, policy_of
+from swarm_mj.learning.ppo import draw, make_model, networks_of
 from swarm_mj.learning.settings import usual_settings
 from swarm_mj.mission import PRESETS
 from swarm_mj.policies.gnn.own_networks import load_network
@@ -221,11 +221,11 @@ def test_a_network_of_ones_own_acts_as_in_training_without_its_value():
     usual = usual_settings("robot", mission, (5,), seed=1)
     training = replace(usual, missions=4, own_network="tiny_networks:Counting")
     model = make_model(training)
-    acting = policy_of(model).acting_network()
-    trained = policy_of(model).network
+    acting = networks_of(model).acting_network()
+    trained = networks_of(model).network
     assert trained.output.out_features == acting.output.out_features + 1 == 2
     node, parent = torch.randn(5, 5, training.network.num_features), torch.full((5, 5), -1)
     memory = acting.remember(node, parent, torch.arange(5), torch.zeros(5, 2))
     numbers = acting(node, parent, None, memory)
     torch.testing.assert_close(numbers, trained(node, parent, None, memory)[..., :1])
-    policy_of(model).take_acting_network(acting)
+    networks_of(model).take_acting_network(acting)

@@ -10,7 +10,7 @@ import torch
 from small_runs import difference, evaluation, run, small_training
 
 from swarm_mj.learning.checkpoint import load, save
-from swarm_mj.learning.ppo import make_model, policy_of
+from swarm_mj.learning.ppo import make_model, networks_of
 from swarm_mj.learning.run_folder import CHECKPOINT
 from swarm_mj.learning.selection import Accumulator, Progress
 from swarm_mj.policies.gnn.extended_features import ExtendedFeatures
@@ -87,12 +87,14 @@ def test_progress_comes_back_to_the_last_bit(tmp_path):
     )
     model = make_model(TRAINING)
     model._last_episode_starts = np.ones(model.n_envs, dtype=bool)
-    save(tmp_path / "c.pt", TRAINING, model, progress, {0: policy_of(model).acting_network()})
+    save(tmp_path / "c.pt", TRAINING, model, progress, {0: networks_of(model).acting_network()})
     again, networks = load(tmp_path / "c.pt", TRAINING, make_model(TRAINING))
     assert math.isnan(again.curve[1].training.pop("train/explained_variance"))
     progress.curve[1].training.pop("train/explained_variance")
     assert again == progress
-    assert not difference(networks[0].state_dict(), policy_of(model).acting_network().state_dict())
+    assert not difference(
+        networks[0].state_dict(), networks_of(model).acting_network().state_dict()
+    )
 
 
 def test_one_that_would_run_code_does_not(tmp_path):

@@ -243,7 +243,7 @@ def test_credits_taken_are_those_of_the_windows_flown_since(scaling):
     horizon, length = 3, WINDOWS + 2
     rng = np.random.default_rng(2)
     asked = []
-    env.considers = lambda: asked[-1]
+    env.considered_recipient = lambda: asked[-1]
     flown = [kept_windows(batch) for batch in env.batches]
     total, count = np.zeros(4), np.zeros(4)
     env.reset()
@@ -277,7 +277,7 @@ def test_windows_before_a_reset_have_no_credits():
     _, env = several_kinds()
     rng = np.random.default_rng(2)
     asked = []
-    env.considers = lambda: asked[-1]
+    env.considered_recipient = lambda: asked[-1]
 
     def fly(num_windows):
         for _ in range(num_windows):

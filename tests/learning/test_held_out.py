@@ -179,9 +179,9 @@ def test_finalists_are_judged_and_the_kept_one_told_on_fresh_missions(monkeypatc
     seeds = []
     fly = Flights.fly
 
-    def noted(flights, policy_of, first_seed, num_missions):
+    def noted(flights, make_flown, first_seed, num_missions):
         seeds.append(set(range(first_seed, first_seed + num_missions)))
-        return fly(flights, policy_of, first_seed, num_missions)
+        return fly(flights, make_flown, first_seed, num_missions)
 
     monkeypatch.setattr(Flights, "fly", noted)
     held_out_costs(TRAINING, NETWORK)
@@ -236,10 +236,10 @@ def test_all_references_fly_the_held_out_missions_and_the_oracle_no_large_teams(
     """Of teams of 101 it has none."""
     flown, fly = [], Flights.fly
 
-    def noted(flights, policy_of, first_seed, size):
-        flown.append((policy_of.args[0], first_seed, size))
+    def noted(flights, make_flown, first_seed, size):
+        flown.append((make_flown.args[0], first_seed, size))
         flights.training = replace(training, robots=(4,))
-        return fly(flights, policy_of, first_seed, size)
+        return fly(flights, make_flown, first_seed, size)
 
     monkeypatch.setattr(Flights, "fly", noted)
     training = replace(TRAINING, held_out=6)

@@ -13,7 +13,7 @@ from small_runs import StopAfter, difference, end_of, evaluation, go_on, small_t
 
 from swarm_mj.learning import held_out
 from swarm_mj.learning.live import LiveTraining, training_curve
-from swarm_mj.learning.ppo import make_model, policy_of
+from swarm_mj.learning.ppo import make_model, networks_of
 from swarm_mj.learning.run_folder import Limits, TrainingRun
 from swarm_mj.learning.train import train
 from swarm_mj.replay import live as replay_live
@@ -130,7 +130,7 @@ def test_a_run_that_is_shown_ends_as_one_that_is_not_to_the_bit(viewer, tmp_path
 
 
 def test_showing_draws_from_no_generator_of_the_training(viewer):
-    network = policy_of(make_model(TRAINING, "cpu")).acting_network()
+    network = networks_of(make_model(TRAINING, "cpu")).acting_network()
     before = torch.get_rng_state(), np.random.get_state()  # noqa: NPY002
     flown = held_out.record_first(TRAINING, network, lambda _share: None)
     viewer.live.show(TRAINING, flown, 0, [evaluation(0)])

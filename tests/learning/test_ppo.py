@@ -258,7 +258,7 @@ def filled(speaks):
         weight = torch.full((ROWS,), 2.0 if step < STEPS // 2 else 3.0)
         done = torch.full((ROWS,), -float(step))
         its = Considered(recipient=torch.from_numpy(recipient), weight=weight, log_p=done)
-        buffer.considers = lambda its=its: its
+        buffer.considered = lambda its=its: its
         seen, zeros = {"owner": owner, "number": number[:, None]}, torch.zeros(ROWS)
         buffer.add(seen, owner, np.zeros(ROWS), np.zeros(ROWS), zeros, zeros)
     credit = np.arange(STEPS * ROWS, dtype=np.float32).reshape(STEPS, ROWS)

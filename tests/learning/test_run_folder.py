@@ -186,7 +186,7 @@ def test_a_rollout_is_of_the_arrays_that_are_made(credit, robots):
         made += sum(array.nbytes for array in empty_memory(4, robots))
         env = env_of(model)
         own = np.tile(np.arange(robots), 4)
-        env.considers = lambda: (own + 1) % robots
+        env.considered_recipient = lambda: (own + 1) % robots
         env.reset()
         for _ in range(training.ppo.num_steps):
             env.step(own)
