@@ -93,8 +93,8 @@ def draw_evaluation(results: Sequence[Result]) -> Figure:
     groups: list[list[Result]] = []
     titles: list[list[str]] = []  # in lines
     heights_in: list[float] = []
-    for said, its in groupby(results, missions_title):
-        shown = sorted(its, key=lambda result: result.aoi_mean)
+    for said, alike in groupby(results, missions_title):
+        shown = sorted(alike, key=lambda result: result.aoi_mean)
         title = textwrap.wrap(said, CHARACTERS, break_on_hyphens=False)
         groups.append(shown)
         titles.append(title)

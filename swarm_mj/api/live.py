@@ -64,7 +64,7 @@ def check_live(where: str | None, speed: float | None, *, given: str = "--live")
             raise ValueError(f"--speed {speed:g} is of live flights; add --live")
         return
     need("rerun", "a live replay", f"do without one: leave out {given}")
-    view.check_live(where)
+    view.check_screen(where)
 
 
 class LiveFlight:

@@ -53,10 +53,10 @@ def parse(arguments: Sequence[str]) -> tuple[Any, Any]:
     from rich.console import Console
 
     from swarm_mj.cli.options import parse_options
-    from swarm_mj.replay.rendering.opengl import check_choice
+    from swarm_mj.replay.rendering.opengl import chosen_backend
 
     name = arguments[0]
-    check_choice()  # before something imports MuJoCo
+    chosen_backend()  # refuses a wrong name before something imports MuJoCo
     with Console(stderr=True).status("Loading ..."):
         command = importlib.import_module(f"swarm_mj.cli.{name}")
     kind = getattr(command, f"{name.title()}Options")

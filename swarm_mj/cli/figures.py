@@ -122,8 +122,8 @@ def _paths(options: FiguresOptions) -> dict[str, list[Path]]:
     outputs: list[Output] = []
     for name in options.figure:
         paths[name] = [options.out / f"{name}.{end}" for end in dict.fromkeys(options.format)]
-    for its in paths.values():
-        outputs += [Output("figure", path) for path in its]
+    for of_figure in paths.values():
+        outputs += [Output("figure", path) for path in of_figure]
     check_outputs(
         *outputs,
         inputs=files_read(options),

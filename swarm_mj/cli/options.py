@@ -16,10 +16,17 @@ from types import MappingProxyType
 from typing import Any, NoReturn, TypeVar, get_origin
 
 from swarm_mj.cli.option_values import CONVERT
-from swarm_mj.system import fields as settings
 from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.exit_codes import BAD_INPUT
-from swarm_mj.system.fields import Meaning, meaning_of
+from swarm_mj.system.fields import (
+    Meaning,
+    as_typed,
+    check,
+    kind_of,
+    meaning_of,
+    range_of,
+    setting,
+)
 from swarm_mj.system.streams import check_printable, in_a_line
 
 Value = TypeVar("Value")
@@ -30,7 +37,7 @@ Given = dict[str, Any]
 MANY = 10**9  # from here on, the end of a range is only there to catch slips
 LEAST = 1e-9  # the beginning of a range that 0 alone does not belong to
 METAVARS: dict[Any, str] = {int: "N", float: "X", str: "NAME", Path: "FILE"}
-output_option = partial(settings.setting, group="output")  # under this heading of the help
+output_option = partial(setting, group="output")  # under this heading of the help
 common_output = partial(output_option, is_common=True)
 NESTED = "nested"  # the key of a field's metadata that several options fill
 
@@ -162,7 +169,7 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
         elif spec.name in given:
             values[spec.name] = given[spec.name]
     options = kind(**values)
-    settings.check(options)
+    check(options)
     return options
 
 
@@ -263,7 +270,7 @@ def _rare(kind: type[Any], options: Sequence[Option]) -> frozenset[str]:
 def _add(group: argparse._ActionsContainer, option: Option) -> None:
     spec = option.spec
     about = option.about
-    kind = settings.kind_of(spec)
+    kind = kind_of(spec)
     flags = flags_of(spec)
     how: dict[str, Any] = {"help": _help(option)}
     if kind is bool:
@@ -293,7 +300,7 @@ def _help(option: Option) -> str:
     if about.high is not None:
         has_end = about.high < MANY
         if has_end:
-            text += f", {settings.range_of(spec)}"
+            text += f", {range_of(spec)}"
         elif about.low == LEAST:
             text += ", more than 0"
         else:
@@ -301,11 +308,11 @@ def _help(option: Option) -> str:
     default = about.shown
     if default is None:
         has_default = not any(spec.default is each for each in (MISSING, None, False, ()))
-        default = settings.as_typed(spec.default) if has_default else ""
+        default = as_typed(spec.default) if has_default else ""
     if default:
         text += f" (default: {default})"
     return text.replace("%", "%%")
 
 
 def _metavar(option: Option) -> str:
-    return option.about.metavar or METAVARS.get(settings.kind_of(option.spec), "VALUE")
+    return option.about.metavar or METAVARS.get(kind_of(option.spec), "VALUE")

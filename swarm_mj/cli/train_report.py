@@ -141,9 +141,14 @@ def verdicts(run: TrainingRun, progress: Progress) -> Iterator[str]:
 
 
 def _comparison(run: TrainingRun, other: str, cost: Cost) -> Iterator[str]:
-    """Yield a sentence about another policy, unless the policy kept clearly beats it."""
-    # Nobody expects it to reach an oracle, which knows everything.
-    if other in ORACLES or (cost.behind <= 0.0 and is_clear(cost) is not False):
+    """Yield a sentence about another policy.
+
+    Nothing is said where the policy kept clearly beats it, or leads in a single mission.
+    """
+    if other in ORACLES:  # which know everything: nobody expects it to reach them
+        return
+    is_unclear = cost.behind_sem is not None and not is_clear(cost)
+    if cost.behind <= 0.0 and not is_unclear:
         return
     yield f"The policy kept {difference(other, cost, run.training.cost)} on the same missions."
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from rich.console import Console
 
@@ -27,6 +27,13 @@ MAX_BYTES = 1_000_000
 MAX_TRAININGS = 1000
 NOT_IN_FILES = ("out", "resume", "sweep", "jobs", "engine", "address")  # of the command line alone
 OWN_ENDS = (DONE, FAILED, BAD_INPUT, INTERRUPTED)  # exit codes of a training that ended by itself
+
+
+class PlannedTraining(NamedTuple):
+    """A training of a sweep."""
+
+    folder: Path  # of the run
+    command: list[str]  # of `swarm-mj`, in words
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -128,17 +135,17 @@ def run_sweep(
         ValueError: An option in the file is unknown, or cannot be trained with.
         OSError: A file cannot be read or written, or the engine could not do all.
     """
-    commands: list[list[str]] = []
+    trainings: list[PlannedTraining] = []
     for name, options in read_sweep(path).items():
         folder = (out / name).resolve()  # processes elsewhere have other current folders
         has_begun = is_resumed and (folder / SETTINGS).exists()
         command = ["train", *options, "--out", str(folder), *(["--resume"] if has_begun else [])]
         _, asked = parse(command)
         check_training(asked)
-        commands.append(command)
+        trainings.append(PlannedTraining(folder, command))
     console = Console(stderr=True, highlight=False, soft_wrap=True)
     try:
-        failed = _train_all(commands, engine, console)
+        failed = _train_all(trainings, engine, console)
     except KeyboardInterrupt:
         console.print("Interrupted; --resume goes on from each training's last checkpoint.")
         return INTERRUPTED
@@ -146,30 +153,27 @@ def run_sweep(
         raise OSError(f"{error}; --resume goes on with the trainings") from error
     if failed:
         raise OSError(
-            f"{len(failed)} of {len(commands)} trainings failed ({', '.join(failed)}); --resume "
+            f"{len(failed)} of {len(trainings)} trainings failed ({', '.join(failed)}); --resume "
             "tries again"
         )
-    folders = shlex.join(map(str, map(_folder_of, commands)))
+    folders = shlex.join(str(training.folder) for training in trainings)
     plain_console().print(f"Compare: {this_command()} curves {folders}")
     return DONE
 
 
-def _train_all(commands: Sequence[list[str]], engine: Engine, console: Console) -> list[str]:
-    """Train by all commands, with a line for each; return the names of the runs that failed."""
-    codes: dict[int, int] = {}  # exit codes by the commands' places
-    bar = WorkBar("Training", len(commands), "trainings", console=console)
+def _train_all(trainings: Sequence[PlannedTraining], engine: Engine, console: Console) -> list[str]:
+    """Train all, with a line for each; return the names of the runs that failed."""
+    codes: dict[int, int] = {}  # exit codes by the trainings' places
+    commands = [training.command for training in trainings]
+    bar = WorkBar("Training", len(trainings), "trainings", console=console)
     with bar:
         for index, outcome in engine.run(train_apart, commands):
-            console.print(_line(_folder_of(commands[index]), outcome), markup=False)
+            console.print(_line(trainings[index].folder, outcome), markup=False)
             if outcome.code == INTERRUPTED:
                 raise KeyboardInterrupt
             codes[index] = outcome.code
             bar.move_to(len(codes))
-    return [_folder_of(commands[index]).name for index in sorted(codes) if codes[index] != DONE]
-
-
-def _folder_of(command: Sequence[str]) -> Path:
-    return Path(command[command.index("--out") + 1])
+    return [trainings[index].folder.name for index in sorted(codes) if codes[index] != DONE]
 
 
 def train_apart(command: Sequence[str]) -> Outcome:

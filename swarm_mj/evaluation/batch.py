@@ -79,6 +79,7 @@ class Moment:
         return count_strayed(self.states.position_m, self.range_m, self.is_active)
 
 
+COLUMN = "column"  # its place among the metadata of a field
 Value = TypeVar("Value")  # one number a mission
 Add = Callable[[np.ndarray, np.ndarray], np.ndarray]  # the next term to the sum so far
 
@@ -110,28 +111,28 @@ def _num_steady(num_windows: int) -> int:
 
 
 def _total(term: Callable[[Moment], Value]) -> Value:
-    return field(metadata={"column": Column(term=term)})
+    return field(metadata={COLUMN: Column(term=term)})
 
 
 def _mean(term: Callable[[Moment], Value]) -> Value:
-    return field(metadata={"column": Column(term=term, divisor=lambda num_windows: num_windows)})
+    return field(metadata={COLUMN: Column(term=term, divisor=lambda num_windows: num_windows)})
 
 
 def _steady_mean(term: Callable[[Moment], Value]) -> Value:
-    return field(metadata={"column": Column(term=term, divisor=_num_steady)})
+    return field(metadata={COLUMN: Column(term=term, divisor=_num_steady)})
 
 
 def _last(term: Callable[[Moment], Value]) -> Value:
-    return field(metadata={"column": Column(term=term, start=np.nan, add=_latest)})
+    return field(metadata={COLUMN: Column(term=term, start=np.nan, add=_latest)})
 
 
 def _first(term: Callable[[Moment], Value]) -> Value:
     """Return a column of the least of its terms, of which nan does not count."""
-    return field(metadata={"column": Column(term=term, start=np.nan, add=np.fmin)})
+    return field(metadata={COLUMN: Column(term=term, start=np.nan, add=np.fmin)})
 
 
 def _of_variance(of_course: Callable[[Float[np.ndarray, "T B"]], Value]) -> Value:
-    return field(metadata={"column": VarianceColumn(of_course=of_course)})
+    return field(metadata={COLUMN: VarianceColumn(of_course=of_course)})
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -193,7 +194,7 @@ class BatchCosts:
 
 
 COLUMNS: dict[str, Column[np.ndarray] | VarianceColumn[np.ndarray]] = {
-    spec.name: spec.metadata["column"] for spec in fields(BatchCosts) if "column" in spec.metadata
+    spec.name: spec.metadata[COLUMN] for spec in fields(BatchCosts) if COLUMN in spec.metadata
 }
 """The costs of each mission by their names: all but `ages`, which counts over all missions."""
 

@@ -284,20 +284,20 @@ def _check_time(mission: Mission, goal: Goal) -> None:
 
 def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
     """Return the cost that has to converge, in words; raise ValueError if there is none."""
-    its = study.task_cost(mission)
+    cost = study.task_cost(mission)
     if goal.below is None:
-        if mission.flocks and (its is None or its.name == Flocking.cost_name):
+        if mission.flocks and (cost is None or cost.name == Flocking.cost_name):
             return f"under {AGREED:.0%} of the first velocity variance"
-        what = f"{its.name} [{its.unit}]" if its else "no cost"
-        way_out = "say below which number of it" if its else "check flocking, or name a controller"
+        what = f"{cost.name} [{cost.unit}]" if cost else "no cost"
+        way_out = "say below which number of it" if cost else "check flocking, or name a controller"
         raise ValueError(f"this task has {what}, so nothing says when it converged; {way_out}")
-    if its is None:
+    if cost is None:
         raise ValueError(
             f"below {goal.below:g} is of a task's cost, and {mission.task} has none; name a "
             "controller with a cost, or check flocking"
         )
-    if goal.unit not in (None, its.unit):
+    if goal.unit not in (None, cost.unit):
         raise ValueError(
-            f"{its.name} is in {its.unit}, not {goal.unit}; give the number in {its.unit}"
+            f"{cost.name} is in {cost.unit}, not {goal.unit}; give the number in {cost.unit}"
         )
-    return f"{its.name} below {goal.below:g} {its.unit}"
+    return f"{cost.name} below {goal.below:g} {cost.unit}"

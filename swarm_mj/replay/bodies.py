@@ -58,7 +58,8 @@ def rotated(
     vector: Float[np.ndarray, "T N 3"], attitude: Float[np.ndarray, "T N 4"]
 ) -> Float[np.ndarray, "T N 3"]:
     """Return vectors of robots' own axes in those of the world."""
-    real, imaginary = attitude[..., :1], attitude[..., 1:]
+    real = attitude[..., :1]
+    imaginary = attitude[..., 1:]
     turned = np.cross(imaginary, vector)
     return vector + 2.0 * (real * turned + np.cross(imaginary, turned))
 

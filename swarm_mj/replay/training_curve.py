@@ -50,7 +50,8 @@ class CostAxis(NamedTuple):
 
     def share(self, values: Float[np.ndarray, "*S"]) -> Float[np.ndarray, "*S"]:
         """Return how far up the axis values are, from 0 to 1; those beyond an end are there."""
-        low, high = self.ticks[0], self.ticks[-1]
+        low = self.ticks[0]
+        high = self.ticks[-1]
         values = np.clip(values, low, high)
         if self.is_log:
             return np.log(values / low) / math.log(high / low)
@@ -59,7 +60,8 @@ class CostAxis(NamedTuple):
 
 def cost_axis(values: Sequence[float]) -> CostAxis:
     """Return an axis from the round number below all values to the one above them."""
-    lowest, highest = min(values), max(values)
+    lowest = min(values)
+    highest = max(values)
     if lowest <= 0.0:
         return CostAxis(ticks=[0.0, palette.nice_top(highest)], is_log=False)
     rounds: list[float] = []

@@ -87,7 +87,7 @@ class LiveViewer(NamedTuple):
             return 0
 
 
-def check_live(where: str) -> None:
+def check_screen(where: str) -> None:
     """Raise ValueError where a window was asked for, and there is no screen."""
     if where == WINDOW:
         need_display('--live web (in Python live="web") serves it to a browser')

@@ -139,8 +139,8 @@ def _with_present_names(value: object, kind: object, at: str = "$") -> object:
     # msgspec itself would drop what is unknown: a newer file would pass. It fills in what lacks and
     # has a default, as such a field is newer than the file, and refuses what has none.
     if get_origin(kind) is tuple and isinstance(value, list):
-        its = get_args(kind)[0]  # of as many as there are
-        return [_with_present_names(each, its, f"{at}[{n}]") for n, each in enumerate(value)]
+        of_each = get_args(kind)[0]  # of as many as there are
+        return [_with_present_names(each, of_each, f"{at}[{n}]") for n, each in enumerate(value)]
     if not (isinstance(kind, type) and is_dataclass(kind) and isinstance(value, dict)):
         return value
     known: dict[Any, Any] = {spec.name: spec for spec in fields(kind)}

@@ -15,7 +15,7 @@ from swarm_mj.replay.view import (
     LOOPBACK,
     VIEWER,
     VideoStyle,
-    check_live,
+    check_screen,
     default_seconds,
     fitted,
     quiet_environment,
@@ -133,8 +133,8 @@ def test_a_live_flight_needs_a_display_or_a_browser(monkeypatch):
     monkeypatch.delenv("DISPLAY", raising=False)
     monkeypatch.delenv("WAYLAND_DISPLAY", raising=False)
     with pytest.raises(ValueError, match=r"no display .*; --live web"):
-        check_live("window")
-    check_live("web")
+        check_screen("window")
+    check_screen("web")
 
 
 def test_a_viewer_that_does_not_open_is_said_in_a_line(monkeypatch):

@@ -33,8 +33,8 @@ def draw_convergence(found: "Convergence") -> Figure:
     last = shares[-1] if len(shares) else 0.0
     low, high = found.interval
     with style.styled():
-        its = found.mission
-        who = f"{its.task}, {its.num_robots} robots, {found.policy}"
+        mission = found.mission
+        who = f"{mission.task}, {mission.num_robots} robots, {found.policy}"
         title = f"{who}: the claim {SAID[found.verdict]}"
         figure, (axes,) = style.panels(title, rows=1, height_in=HEIGHT_IN)
         steps_s = [0.0, *times_s, end_s]

@@ -56,7 +56,9 @@ CHASE_UP = 0.14  # of that distance: it looks above the robot, which leaves the 
 CHASE_FOV_Y_DEG = 52.0  # a short lens, which sees the team around
 CHASE_S = 2.0  # before and after: over which its course is the mean
 # It looks along the course of these seconds; these count beside it, as that many metres of it do.
-WAY_M, TEAM_M, NORTH_M = 0.1, 0.01, 1e-6
+WAY_M = 0.1
+TEAM_M = 0.01
+NORTH_M = 1e-6
 CHASE_RISE = 0.05  # of packets' arcs: higher ones would leave the view
 CHASE_NEAR_M = 0.2  # nearer things are not drawn
 COVER = 1.05  # the least radius of a point's ball, by that of the white ball that MuJoCo has of it

@@ -41,7 +41,7 @@ def unusable(error: Exception) -> OSError:
     return OSError(f"{backend()} does not work here ({type(error).__name__}); {WAY_OUT}")
 
 
-def check_choice() -> str:
+def chosen_backend() -> str:
     """Return MUJOCO_GL in lower case; raise ValueError for a name by which MuJoCo cannot load."""
     chosen = os.environ.get(CHOICE, "").lower().strip()
     if chosen and chosen not in (*NAMES, *ON, *OFF):
@@ -56,7 +56,7 @@ def backend() -> str:
     What works is found once and written to MUJOCO_GL. Raise OSError if none works, or MUJOCO_GL
     says that there is to be none.
     """
-    named = check_choice()
+    named = chosen_backend()
     if named in OFF:
         raise OSError(f"{CHOICE}={named} switches rendering off; unset it")
     if named in ("", *ON):

@@ -164,7 +164,8 @@ def encode_mp4(pictures: Iterable[Picture], style: VideoStyle) -> bytes:
     content = io.BytesIO()
     with av.open(content, "w", format="mp4") as container:
         stream = container.add_stream("libx264", rate=Fraction(style.fps).limit_denominator())
-        stream.width, stream.height = style.width, style.height
+        stream.width = style.width
+        stream.height = style.height
         stream.pix_fmt = "yuv420p"  # the only one that all browsers play
         stream.options = {"crf": QUALITY, "preset": "fast"}
         for picture in pictures:
