@@ -46,7 +46,10 @@ ROOT = Path(__file__).resolve().parents[1]
 GOLDEN = ROOT / "tests" / "golden" / "same.json"
 REVISIONS = ROOT / ".venv" / "same"  # their packages, with what numba compiled of them
 RESULTS_TASK = "results"
-EQUAL, MOVED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
+EQUAL = 0
+MOVED = 1
+BAD_INPUT = 2
+INTERRUPTED = 130
 FAILED = "failed: "  # begins the trace of a task that raised an error
 WINDOWS_BEFORE_RESTART = 5
 # Sums depend on the number of threads that share them.
@@ -63,7 +66,8 @@ class Tracer:
     """Digests of what a task leaves, step by step."""
 
     def __init__(self) -> None:
-        self._whole, self._steps = hashlib.blake2b(digest_size=8), ""
+        self._whole = hashlib.blake2b(digest_size=8)
+        self._steps = ""
 
     def add(self, *values: object) -> None:
         """Add one step's numbers and texts."""
@@ -134,7 +138,8 @@ def fly(flight: Flight) -> str:
 
 def left_by(swarm: Any, costs: Any) -> list[object]:  # noqa: ANN401 - as above
     """Return all that a window leaves: buffers, packets, true states and costs."""
-    views, states = swarm.views, swarm.states
+    views = swarm.views
+    states = swarm.states
     known = views.buffers
     left: list[object] = [views.now, known.timestamp, known.position_m, known.velocity_mps]
     left += [known.parent, known.last_attempt, known.is_known, known.is_granted]
@@ -297,7 +302,8 @@ def difference(name: str, before: str | None, after: str | None) -> str | None:
         return "is gone"
     if after.startswith(FAILED) or before is None or before.startswith(FAILED):
         return after if after.startswith(FAILED) else "has no digest to compare with"
-    old, new = before.split()[1], after.split()[1]
+    old = before.split()[1]
+    new = after.split()[1]
     if len(old) != len(new):
         return f"has {len(new) // 2} steps instead of {len(old) // 2}"
     count = len(new) // 2
@@ -424,10 +430,13 @@ def compare_golden(options: argparse.Namespace, tasks: Sequence[str], console: C
     """Fly, compare with a revision or the committed digests, and say what moved."""
     other_machine: list[str] = []
     if options.against:
-        before, what = fly_revision(options.against, options, console), options.against
+        before = fly_revision(options.against, options, console)
+        what = options.against
     else:
-        stored, here = read(options.golden), machine()
-        before, what = stored["traces"], options.golden.name
+        stored = read(options.golden)
+        here = machine()
+        before = stored["traces"]
+        what = options.golden.name
         for name, value in here.items():
             if stored["machine"].get(name) != value:
                 other_machine.append(f"{name} {stored['machine'].get(name)} there, {value} here")

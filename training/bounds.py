@@ -77,7 +77,8 @@ def most_informed(hops: Float[np.ndarray, "N N"], receptions: int) -> Float[np.n
 
     For L of 1 and more, up to where that is all pairs.
     """
-    informed, length = [float(len(hops))], 0
+    informed = [float(len(hops))]
+    length = 0
     while informed[-1] < hops.size:
         length += 1
         known = 2.0 ** (length - 1)  # at most, by any sender (Lemma 3)
@@ -117,7 +118,8 @@ class _Programme:
 
     def __init__(self, links: Links) -> None:
         power = links.received_mw / links.noise_mw
-        self._power, self._threshold = power, links.threshold
+        self._power = power
+        self._threshold = links.threshold
         self._num_robots = len(power)
         self._links = np.argwhere(lone_links(links))
         self.is_reception = np.arange(self._num_robots + len(self._links)) >= self._num_robots
@@ -192,12 +194,14 @@ def exact_age(links: Links, cap: int, sweeps: int = 400) -> tuple[float, float]:
     """
     after, cost = _graph(slots_of(links), cap)
     value = np.zeros(len(cost))
-    low, high = 0.0, np.inf
+    low = 0.0
+    high = np.inf
     for _ in range(sweeps):
         # From one window's end to the next. Half of each step stands still: no cycles in value.
         ahead = 0.5 * value + 0.5 * (cost + np.min(value[after], axis=1))
         rise = 2.0 * (ahead - value)
-        low, high = max(low, float(rise.min())), min(high, float(rise.max()))
+        low = max(low, float(rise.min()))
+        high = min(high, float(rise.max()))
         value = ahead - ahead.min()
         if high - low < 1e-3:
             break
@@ -210,7 +214,9 @@ def _graph(
     """Return each state's successors after a window, and its mean age [slots]."""
     num_robots = slots.shape[1]
     start = np.where(np.eye(num_robots, dtype=bool), 0, cap).astype(np.int8)
-    index, states, after = {start.tobytes(): 0}, [start], []
+    index = {start.tobytes(): 0}
+    states = [start]
+    after = []
     for state in states:  # grows meanwhile
         nexts = []
         for first in _distinct(state[None], slots, cap):
@@ -312,7 +318,8 @@ def exact_rows(seconds: float) -> Iterator[Exact]:
     radio = radio_of(paper("stationary"))
     for team, position_m in SMALL_TEAMS.items():
         links = links_between(radio, np.array(position_m, dtype=float))
-        floor, (optimum, _) = floor_windows(links, seconds), exact_age(links, CAP)
+        floor = floor_windows(links, seconds)
+        optimum, _ = exact_age(links, CAP)
         yield Exact(
             team=team,
             floor_windows=floor,

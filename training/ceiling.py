@@ -67,7 +67,8 @@ class Annealed(CentralisedPolicy):
 
     def start(self, num_robots: int, rngs: Sequence[np.random.Generator]) -> None:  # noqa: ARG002
         """Forget the last missions' schedules; arguments as in `Policy.start`."""
-        self._rngs, self._schedules = rngs, []
+        self._rngs = rngs
+        self._schedules = []
 
     def recipients(self, views: LocalViews, states: RobotStates) -> Int[np.ndarray, "B N"]:
         """Return who broadcasts in the next slot of each mission's period."""
@@ -131,7 +132,8 @@ def mean_age(heard: Int[np.ndarray, "L N"]) -> float:
     """
     length, num_robots = heard.shape
     timestamp = np.full((num_robots, num_robots), np.float32(NEVER_SLOTS))
-    now, age = 0.0, 0.0
+    now = 0.0
+    age = 0.0
     for slot in range(NUM_REPEATS * length):
         now += 1.0
         observe_own(timestamp, now)
@@ -147,14 +149,16 @@ def _merge(timestamp: Float32[np.ndarray, "N N"], heard: Int[np.ndarray, "N"]) -
     """Merge what everyone decoded (Eq. 8); who is decoded decodes nobody: its row is as sent."""
     for j in range(heard.shape[0]):
         if heard[j] != j:
-            row, sent = timestamp[j], timestamp[heard[j]]
+            row = timestamp[j]
+            sent = timestamp[heard[j]]
             for k in range(heard.shape[0]):
                 row[k] = max(row[k], sent[k])
 
 
 @compiled(fastmath={"reassoc", "nnan", "nsz"})
 def _total_age(timestamp: Float32[np.ndarray, "N N"], now: float) -> float:
-    total, end = np.float32(0.0), np.float32(now)
+    total = np.float32(0.0)
+    end = np.float32(now)
     for j in range(timestamp.shape[0]):
         for k in range(timestamp.shape[0]):
             total += end - timestamp[j, k]
@@ -171,7 +175,8 @@ def anneal(
     cold: float,
 ) -> tuple[Bool[np.ndarray, "L N"], float]:
     """Return the best schedule found, and its age [windows]."""
-    period, best = period.copy(), period.copy()
+    period = period.copy()
+    best = period.copy()
     heard = receptions(period, links)
     age = mean_age(heard)
     least = age
@@ -203,7 +208,9 @@ def _change(
 ) -> None:
     """Change a slot's transmitters, or those of two slots, at random."""
     num_robots = slot.shape[0]
-    kind, k, m = rng.random(), int(rng.random() * num_robots), int(rng.random() * num_robots)
+    kind = rng.random()
+    k = int(rng.random() * num_robots)
+    m = int(rng.random() * num_robots)
     for _ in range(4 * num_robots):  # a robot that transmits, if there is one
         if slot[k]:
             break
@@ -211,7 +218,8 @@ def _change(
     if kind < 0.25:
         slot[m] = not slot[m]
     elif kind < 0.5:
-        slot[k], slot[m] = False, True
+        slot[k] = False
+        slot[m] = True
     elif kind < 0.8:
         other[k] = other[k] or slot[k]
         slot[k] = False

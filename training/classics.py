@@ -31,7 +31,13 @@ from swarm_mj.cli import script
 from swarm_mj.mission import Mission, paper
 from swarm_mj.mission.batched_rng import Stream, uniform
 from swarm_mj.physics.state import RobotStates
-from swarm_mj.policies.policy import BroadcastPolicy, CentralisedPolicy, Parameters, Policy
+from swarm_mj.policies.policy import (
+    BroadcastPolicy,
+    CentralisedPolicy,
+    Parameters,
+    Policy,
+    two_broadcasts,
+)
 from swarm_mj.protocol.buffers import BROADCAST
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS
 from swarm_mj.protocol.window import LocalViews
@@ -66,10 +72,7 @@ class MaxWeight(CentralisedPolicy):
 
     def window(self, mission: Mission) -> DoubleBroadcast:
         """Return what the robots do in a window: they broadcast twice, unanswered."""
-        return DoubleBroadcast(
-            silence_is_attempt=mission.silence_is_attempt,
-            needs_addressees=mission.half_duplex == "eavesdroppers",
-        )
+        return two_broadcasts(mission)
 
     def inform(self, truth: TrueLinks) -> None:
         """Decide by the true channel from now on."""

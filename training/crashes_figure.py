@@ -54,8 +54,8 @@ class CrashesFigure:
 
 def at_density(found: Sequence[Result], density_per_km2: float) -> list[Result]:
     """Return the results of teams of a density, by how old their news was."""
-    its = [each for each in found if mission_field(each, "density_per_km2") == density_per_km2]
-    return sorted(its, key=news_age)
+    alike = [each for each in found if mission_field(each, "density_per_km2") == density_per_km2]
+    return sorted(alike, key=news_age)
 
 
 def news_age(result: Result) -> float:
@@ -77,11 +77,11 @@ def draw(found: Sequence[Result]) -> Figure:
         title = "Quadrotors that crashed, by how old their news of each other was"
         figure, both = panels(title, rows=len(DENSITIES_PER_KM2), height_in=5.4)
         for axes, density_per_km2 in zip(both, DENSITIES_PER_KM2, strict=True):
-            its = at_density(found, density_per_km2)
-            _draw_one(axes, its)
+            results = at_density(found, density_per_km2)
+            _draw_one(axes, results)
             apart_m = 1e3 / density_per_km2**0.5
             axes.set_title(f"{density_per_km2:,.0f} robots per km², {apart_m:.0f} m apart")
-            axes.set_ylabel(f"crashed, of {its[0].num_robots} robots")
+            axes.set_ylabel(f"crashed, of {results[0].num_robots} robots")
             axes.set_ylim(bottom=0.0)
         both[-1].set_xlabel("age of information [windows]")
         both[0].set_ylim(top=1.4 * both[0].get_ylim()[1])  # room for the legend
@@ -137,7 +137,7 @@ def table(folder: Path) -> str:
         for each in at_density(found, density_per_km2):
             mean, worst = crashed(each)
             cells[_name(each)] += [f"{news_age(each):.1f}", f"{mean:.1f} ({worst:.0f})"]
-    return markdown_table(head, [[name, *its] for name, its in cells.items()])
+    return markdown_table(head, [[name, *row] for name, row in cells.items()])
 
 
 def _name(result: Result) -> str:

@@ -114,8 +114,8 @@ class Work:
     @property
     def is_trained(self) -> bool:
         """True if the policies of this very experiment are there, and the tables of them."""
-        its = self.tables
-        paths = [its.trainings, its.curves, *map(self.policy, self.experiment.trainings)]
+        tables = [self.tables.trainings, self.tables.curves]
+        paths = [*tables, *map(self.policy, self.experiment.trainings)]
         if not all(path.exists() for path in paths):
             return False
         rows = read_rows(self.tables.trainings, "table of trainings")
@@ -221,7 +221,9 @@ class Work:
     def _keep(self) -> None:
         """Keep the policies, and write the tables of trainings, which say whose they are, last."""
         rows = {name: _rows(self.folder / name / CURVE) for name in self.trainings}
-        table = [{"training": name} | row for name, its in rows.items() for row in its]
+        table: list[dict[str, Any]] = []
+        for name, curve in rows.items():
+            table += [{"training": name} | row for row in curve]
         writing.write_csv(
             self.tables.curves,
             CURVE_COLUMNS,
@@ -230,8 +232,8 @@ class Work:
         for name in self.trainings:
             trained = read_file(self.folder / name / POLICY, "policy", MOST_BYTES)
             writing.write_bytes(self.policy(name), trained)
-        its = map(self._training, rows, rows.values())
-        writing.write_csv(self.tables.trainings, TRAINING_COLUMNS, its)
+        trainings = map(self._training, rows, rows.values())
+        writing.write_csv(self.tables.trainings, TRAINING_COLUMNS, trainings)
 
     def _training(self, name: str, rows: Sequence[dict[str, Any]]) -> dict[str, object]:
         """Return a row of the table of trainings."""

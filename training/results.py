@@ -128,12 +128,12 @@ def fly_crashes(settings: Settings) -> int:
     drafts: list[Path] = []
     rows: list[Result] = []
     for name, study in crashes.studies().items():
-        its = [settings.drafts.absolute() / f"crashes-{name}{kind}" for kind in KINDS]
-        code = fly_drafts(settings, study, its)
+        pair = [settings.drafts.absolute() / f"crashes-{name}{kind}" for kind in KINDS]
+        code = fly_drafts(settings, study, pair)
         if code != DONE:
             return code
-        rows += read_results(its[0])
-        drafts += its
+        rows += read_results(pair[0])
+        drafts += pair
     write_results(settings.folder / "crashes.csv", rows)
     for draft in drafts:
         draft.unlink()

@@ -45,7 +45,8 @@ def steer(target_m: Float[np.ndarray, "B N D"], states: RobotStates) -> Float[np
 class Formation:
     """Robots line up in the rows of a square block, in the order of their identities."""
 
-    cost_name, cost_unit = "formation error", "m"
+    cost_name = "formation error"
+    cost_unit = "m"
 
     def __init__(self, mission: Mission) -> None:
         self._place_m = block(mission.num_robots, BLOCK_SHARE * mission.side_m)
@@ -79,7 +80,8 @@ class Reynolds:
     others to be, and separation away from each that is near.
     """
 
-    cost_name, cost_unit = "spread of the flock", "m"
+    cost_name = "spread of the flock"
+    cost_unit = "m"
 
     def __call__(self, buffers: Buffers, states: RobotStates, /) -> Float[np.ndarray, "B N D"]:
         """Return the sum of the three rules' accelerations [m/s²]."""
@@ -105,7 +107,8 @@ def spread_m(
 class Coverage:
     """Robots spread out, so that no point of the area is far from all of them."""
 
-    cost_name, cost_unit = "distance to the nearest robot", "m"
+    cost_name = "distance to the nearest robot"
+    cost_unit = "m"
 
     def __init__(self, mission: Mission) -> None:
         self._half_side_m = mission.half_side_m
@@ -118,7 +121,8 @@ class Coverage:
 
     def cost(self, states: RobotStates, /) -> Float[np.ndarray, "B"]:
         """Return the root mean square distance of the area to its nearest active robot [m]."""
-        position_m, is_active = states.position_m, states.is_active
+        position_m = states.position_m
+        is_active = states.is_active
         counts = np.ones(position_m.shape[:2], dtype=np.bool_) if is_active is None else is_active
         return np.sqrt(_mean_squares(position_m, self._half_side_m, counts))
 
@@ -159,7 +163,8 @@ def _mean_places(
     for b in range(is_known.shape[0]):
         for i in range(is_known.shape[1]):
             for axis in range(2):
-                total, num_known = 0.0, 0
+                total = 0.0
+                num_known = 0
                 for j in range(is_known.shape[1]):
                     if j != i and is_known[b, i, j]:
                         total += known_m[b, i, j, axis] + place_m[i, axis] - place_m[j, axis]
@@ -212,7 +217,9 @@ def cell(
     polygon = np.array([[-h, -h], [h, -h], [h, h], [-h, h]])
     for j in range(len(counts)):
         if j != i and counts[j]:
-            farthest_m2, x, y = 0.0, position_m[i, 0], position_m[i, 1]
+            farthest_m2 = 0.0
+            x = position_m[i, 0]
+            y = position_m[i, 1]
             for c in range(len(polygon)):
                 farthest_m2 = max(farthest_m2, (polygon[c, 0] - x) ** 2 + (polygon[c, 1] - y) ** 2)
             # A robot twice as far as the cell's farthest corner cuts nothing off.
@@ -226,12 +233,14 @@ def _nearer(
     polygon: Float[np.ndarray, "corners 2"], position_m: Float[np.ndarray, "N D"], i: int, j: int
 ) -> Float[np.ndarray, "corners 2"]:
     """Clip a polygon along the bisector of i and j (Sutherland and Hodgman 1974)."""
-    across_x, across_y = position_m[j, 0] - position_m[i, 0], position_m[j, 1] - position_m[i, 1]
+    across_x = position_m[j, 0] - position_m[i, 0]
+    across_y = position_m[j, 1] - position_m[i, 1]
     if across_x == 0.0 and across_y == 0.0 and j < i:
         return polygon[:0]
     middle_x = (position_m[i, 0] + position_m[j, 0]) / 2.0
     middle_y = (position_m[i, 1] + position_m[j, 1]) / 2.0
-    kept, num_kept = np.empty((len(polygon) + 1, 2)), 0
+    kept = np.empty((len(polygon) + 1, 2))
+    num_kept = 0
     for corner in range(len(polygon)):
         x, y = polygon[corner - 1]
         next_x, next_y = polygon[corner]
@@ -252,10 +261,15 @@ def moments(
     polygon: Float[np.ndarray, "corners 2"], about_m: Float[np.ndarray, "2"]
 ) -> tuple[float, float, float, float]:
     """Return area [m²], first moments in x and y [m³] and polar moment [m⁴] about a point."""
-    area, first_x, first_y, second = 0.0, 0.0, 0.0, 0.0
+    area = 0.0
+    first_x = 0.0
+    first_y = 0.0
+    second = 0.0
     for corner in range(len(polygon)):
-        x, y = polygon[corner - 1, 0] - about_m[0], polygon[corner - 1, 1] - about_m[1]
-        next_x, next_y = polygon[corner, 0] - about_m[0], polygon[corner, 1] - about_m[1]
+        x = polygon[corner - 1, 0] - about_m[0]
+        y = polygon[corner - 1, 1] - about_m[1]
+        next_x = polygon[corner, 0] - about_m[0]
+        next_y = polygon[corner, 1] - about_m[1]
         twice = x * next_y - next_x * y
         area += twice / 2.0
         first_x += twice * (x + next_x) / 6.0

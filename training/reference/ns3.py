@@ -252,7 +252,7 @@ def heard(mission: Mission, recipient: np.ndarray, arrays: Arrays) -> np.ndarray
     """
     decodes = arrays["decodes"]
     robots = np.arange(decodes.shape[2])
-    if mission.half_duplex == "eavesdroppers":
+    if mission.recipient_hears_while_sending:
         is_addressed = recipient[:, :, None] == robots
         decodes = decodes | (arrays["decodes_if_silent"] & is_addressed)
     power_mw = np.where(decodes, arrays["received_mw"], 0.0)
@@ -322,7 +322,7 @@ def drawn(scenes: Scenes, rng: np.random.Generator) -> tuple[np.ndarray, np.ndar
     for row in recipient:
         senders = rng.choice(num_robots, rng.integers(1, MOST_SENDERS + 1), replace=False)
         row[senders] = EVERYONE
-        if mission.half_duplex == "eavesdroppers":  # which needs packets that are addressed
+        if mission.recipient_hears_while_sending:  # which needs packets that are addressed
             row[senders] = (senders + rng.integers(1, num_robots, len(senders))) % num_robots
             row[senders[:-1]] = senders[1:]  # and robots that send while they are addressed
     if mission.has_bodies:

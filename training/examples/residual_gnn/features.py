@@ -24,7 +24,9 @@ from swarm_mj.radio.reception import is_received, sinr
 from swarm_mj.system.compiled import compiled
 
 OLDEST = 400  # ages count no further [slots]
-WORST, BEST = -2.0, 2.0  # margins, in decades of SINR
+# Margins, in decades of SINR.
+WORST = -2.0
+BEST = 2.0
 
 
 class Own(IntEnum):
@@ -134,10 +136,12 @@ def see(
         How many neighbours there are in all.
     """
     num_robots = observed.shape[1]
-    predicted, others = empty_receptions(num_robots), np.zeros(num_robots, dtype=np.bool_)
+    predicted = empty_receptions(num_robots)
+    others = np.zeros(num_robots, dtype=np.bool_)
     count = 0
     for r in range(rows.shape[0]):
-        b, i = rows[r, 0], rows[r, 1]
+        b = rows[r, 0]
+        i = rows[r, 1]
         own = _Knowledge(
             int(i),
             int(tick[b]),
@@ -182,12 +186,16 @@ def _see_neighbour(
     edge: Float32[np.ndarray, "G"],
 ) -> None:
     """Fill in what a robot sees of neighbour j, in the order of `Neighbour`."""
-    i, now, held = own.identity, own.now, own.held
-    power, total = float(predicted.power[j]), float(predicted.total[j])
+    i = own.identity
+    now = own.now
+    held = own.held
+    power = float(predicted.power[j])
+    total = float(predicted.total[j])
     strongest = float(predicted.strongest[j])
     beside = sinr(power, total, 1.0)
     other = decoded_by(j, predicted, 0.0, threshold)
-    news, news_of_other = 0.0, 0.0
+    news = 0.0
+    news_of_other = 0.0
     if not others[j]:
         news = _news(i, own.known, j, held[j], now)
         if other != NOBODY:
@@ -221,11 +229,15 @@ def _see_oneself(
     robot: Float32[np.ndarray, "F"],
 ) -> None:
     """Fill in what a robot sees of itself, as far as it follows from these."""
-    i, now, degree = own.identity, own.now, neighbours.shape[0]
+    i = own.identity
+    now = own.now
+    degree = neighbours.shape[0]
     sender = decoded_by(i, predicted, 0.0, threshold)
     gain = 0.0 if sender == NOBODY else _news(sender, own.held[sender], i, own.known, now)
     strongest = float(predicted.strongest[i])
-    above, inbound_ratio, outbound_ratio = 0, 0.0, 0.0
+    above = 0
+    inbound_ratio = 0.0
+    outbound_ratio = 0.0
     for n in range(degree):
         above += neighbours[n, Neighbour.DRAWS_MORE] > 0.0
         inbound_ratio += neighbours[n, Neighbour.INBOUND_RATIO]

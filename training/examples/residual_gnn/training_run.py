@@ -22,6 +22,7 @@ from residual_gnn.recording import Recorder, TrainingBatch, collect_batch
 from residual_gnn.rule import RestingRule
 from residual_gnn.torch_network import ResidualNetwork
 from swarm_mj.learning.checkpoint import read_torch
+from swarm_mj.learning.settings import CHOICE_SEED, HELD_OUT_SEED
 from swarm_mj.mission import Mission
 from swarm_mj.protocol.timestamps import SLOTS_PER_WINDOW
 from swarm_mj.radio.mission_radio import radio_of
@@ -32,8 +33,6 @@ from swarm_mj.system.writing import write_bytes, write_csv
 
 CHECKPOINT, CURVE = "checkpoint.pt", "curve.csv"
 FIRST_PLACE = 30_000  # seeds of the places where training flies
-HELD_OUT_SEED = 500_000  # of missions that judge
-CHOICE_SEED = 510_000  # of those that choose among the best
 DEFAULT_PPO = PpoSettings()
 NUM_BEST = 3  # that are chosen among, with the untrained one
 
