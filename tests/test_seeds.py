@@ -27,7 +27,6 @@ DEBTS = {
     "training/results/ceiling.csv",
     "training/results/channels.csv",
     "training/results/classics.csv",
-    "training/results/elsewhere.csv",
     "training/results/floor.csv",
     "training/results/impairments.csv",
     "training/results/large-teams-small.csv",
@@ -36,9 +35,6 @@ DEBTS = {
     "training/results/one-reference.csv",
     "training/results/position-noise.csv",
     "training/results/prior-knowledge.csv",
-    "training/results/reference-flocking.csv",
-    "training/results/reference-random-walk.csv",
-    "training/results/reference-stationary.csv",
     "training/results/tutorial.csv",
 }
 

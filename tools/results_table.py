@@ -121,6 +121,10 @@ def _cell(
     if fact := column.get("fact"):
         return row.get(fact) or _fact(row["policy"], fact)
     where = spec.get("where", {}) | _keys(column) | _keys(row)
+    if where != where | _keys(column):
+        raise ValueError(
+            f"the row {row} contradicts its column {column}: one number would fill all"
+        )
     rows = read(_sources(spec, column, row), folder)
     _check_keys(where, rows)
     found = select(rows, where)

@@ -57,7 +57,7 @@ class Information(Enum):
     )
     RADIO_CONSTANTS = Kind(
         label="radio constants",
-        sentence="The radio's range, noise and least SINR.",
+        sentence="The radio's range, noise and least SINR; to `gnn` V_max, the bound of speeds.",
     )
     COMMON_RANDOM_NUMBERS = Kind(
         label="common random numbers",

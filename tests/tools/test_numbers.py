@@ -19,12 +19,11 @@ BY_HAND = re.compile(r"±|\bcommit `?[0-9a-f]{7,}")
 HISTORY = {RESULTS / "classics-tuning.csv"}
 # Tables of version 1.1.0: the release flies all others at this commit, too.
 QUICK = RESULTS / "reproduce" / "quick"
-PAPERS = {RESULTS / f"paper-{task}.csv" for task in ("stationary", "random-walk", "flocking")}
-RELEASED = (
-    {RESULTS / f"{name}.csv" for name in ("benchmark", "city", "routes")}
-    | PAPERS
-    | set(QUICK.glob("*.csv"))
-)
+PRESETS = set(RESULTS.glob("paper-*.csv")) | set(RESULTS.glob("reference-*.csv"))
+OTHERS_FLOWN = {
+    RESULTS / f"{name}.csv" for name in ("benchmark", "city", "elsewhere", "peers", "routes")
+}
+RELEASED = PRESETS | OTHERS_FLOWN | set(QUICK.glob("*.csv"))
 # Tables of what older code did not measure or fly, or that are measured apart.
 CONVERGING = {RESULTS / f"converging{what}.csv" for what in ("", "-courses", "-late", "-teams")}
 APART = (
@@ -33,7 +32,6 @@ APART = (
     "falls",
     "lookahead-blocks",
     "one-reference",
-    "peers",
 )
 NEWER = (RELEASED, CONVERGING, *({RESULTS / f"{name}.csv"} for name in APART))
 

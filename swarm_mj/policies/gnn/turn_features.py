@@ -133,7 +133,7 @@ class TurnFeatures(FeatureExtractor):
     """The paper's information, with whose turn it is by staleness: the fields of `TurnNode`."""
 
     names: ClassVar[tuple[str, ...]] = names_of(TurnNode)
-    uses: ClassVar[str] = "its buffer and the radio's range"
+    uses: ClassVar[str] = "its buffer, the radio's range and V_max"
 
     def graphs(self, views: LocalViews) -> Graphs:
         """Return the buffers, encoded; teammates believed far out of range are not addressed."""
