@@ -9,7 +9,7 @@ from xml.etree import ElementTree
 import numpy as np
 from jaxtyping import Float
 from mujoco._enums import mjtDisableBit
-from mujoco._specs import MjsActuator, MjsGeom, MjsJoint, MjSpec
+from mujoco._specs import MjsGeom, MjSpec
 from mujoco._structs import MjModel
 
 from swarm_mj.mission import MISSION_DISTANCE_M, Mission
@@ -19,6 +19,7 @@ from swarm_mj.physics.obstacles import OBSTACLE_GROUP, ROBOTS_BIT, SCENE_BIT
 from swarm_mj.physics.pilots import GRAVITY_MPS2
 from swarm_mj.physics.robot_model import PLANAR_PLACE, VELOCITY
 from swarm_mj.physics.robots import RobotKind, add_robots, kinds_of, pose_of
+from swarm_mj.physics.scene_guard import check_kept, hull_of, kept_parts
 from swarm_mj.physics.state import ROBOT_HEIGHT_M, ROBOT_RADIUS_M, RobotStates
 from swarm_mj.system.arguments import name_of
 from swarm_mj.system.packages import asset
@@ -62,57 +63,6 @@ ROUNDING = 1e-9  # of a number of steps: where a step divides a window, none is 
 # An overdamped limit that turns v into -v within one Euler step: a = -2 v / h (MuJoCo, solref in
 # the direct form). Tight impedance, or part of the speed is lost.
 ELASTIC_SOLIMP = [0.9999, 0.9999, 0.001, 0.5, 2.0]
-# What a scene must leave, by what it is of.
-OF_JOINTS = (
-    "axis",
-    "damping",
-    "stiffness",
-    "frictionloss",
-    "armature",
-    "range",
-    "limited",
-    "ref",
-    "springref",
-    "actfrclimited",
-    "solref_limit",
-    "solimp_limit",
-    "actgravcomp",
-    "margin",
-)
-OF_ACTUATORS = (
-    "damping",
-    "armature",
-    "gear",
-    "gainprm",
-    "biasprm",
-    "gaintype",
-    "biastype",
-    "dyntype",
-    "dynprm",
-    "ctrlrange",
-    "forcerange",
-    "ctrllimited",
-    "forcelimited",
-)
-OF_OPTIONS = (
-    "integrator",
-    "solver",
-    "cone",
-    "jacobian",
-    "enableflags",
-    "disableactuator",
-    "iterations",
-    "tolerance",
-    "ls_iterations",
-    "ls_tolerance",
-    "impratio",
-    "gravity",
-    "wind",
-    "density",
-    "viscosity",
-)
-# What a scene must leave of the sphere that stands for a robot; `_check_free` sees to its mass.
-HULL = ("type", "size", "pos", "quat", "fromto", "contype", "conaffinity", "margin", "gap")
 CAMERA_HEIGHT_PER_SIDE = 1.3  # sees the whole area at a field of view of 45 degrees
 
 
@@ -235,77 +185,25 @@ def _rename(element: ElementTree.Element, i: int) -> None:
 
 def _change(spec: MjSpec, mission: Mission, scene: Scene) -> None:
     """Let a scene change the arena, but neither the robots' joints nor how MuJoCo steps."""
-    parts = _moving_parts(spec)
-    before = _motion(spec)
-    hulls = {} if mission.has_bodies else _hulls(spec, mission)
+    num_hulls = 0 if mission.has_bodies else mission.num_robots
+    before = kept_parts(spec, num_hulls)
     step_s = spec.option.timestep
     flags = spec.option.disableflags
     scene(spec, mission)
-    _check_parts(scene, parts, _moving_parts(spec))
-    _check_unchanged("how robots move", before, _motion(spec))
+    check_kept(name_of(scene), before, kept_parts(spec, num_hulls))
     spec.option.timestep = step_s
     spec.option.disableflags = flags
     if mission.has_bodies:
         return
-    _check_unchanged("the robots' hulls", hulls, _hulls(spec, mission))
     if mission.physics == "exact":
         spec.option.disableflags |= int(mjtDisableBit.mjDSBL_CONTACT)
         return
     spec.option.disableflags &= ~int(mjtDisableBit.mjDSBL_CONTACT)
     for i in range(mission.num_robots):
-        _hull(spec, i).conaffinity |= SCENE_BIT  # meets the scene's geoms, no robot
+        hull_of(spec, i).conaffinity |= SCENE_BIT  # meets the scene's geoms, no robot
     for geom in spec.geoms:
         if geom.group == OBSTACLE_GROUP:
             _bounce(geom, mission, priority=1)  # its own contact parameters count
-
-
-def _check_parts(scene: Scene, before: list[str], after: list[str]) -> None:
-    """Raise ValueError if a scene added, took away or renamed what moves or is moved."""
-    name = name_of(scene)
-    for part in after:
-        if part not in before:
-            raise ValueError(f"scene {name} adds {part}; scenes may add only static geometry")
-    for part in before:
-        if part not in after:
-            raise ValueError(
-                f"scene {name} removes or renames {part}; robots must keep joints and actuators"
-            )
-
-
-def _check_unchanged(what: str, before: dict[str, str], after: dict[str, str]) -> None:
-    """Raise ValueError if one of the numbers that a scene must leave is another now."""
-    for name, value in after.items():
-        if value != before.get(name):
-            raise ValueError(f"a scene must leave {what}, but changed {name}; add geoms instead")
-
-
-def _moving_parts(spec: MjSpec) -> list[str]:
-    """Return what a message calls each joint and actuator; no two of them are called alike."""
-    joints = [f"joint {_called(n, joint)}" for n, joint in enumerate(spec.joints)]
-    actuators = [f"actuator {_called(n, each)}" for n, each in enumerate(spec.actuators)]
-    return joints + actuators
-
-
-def _called(n: int, part: MjsJoint | MjsActuator) -> str:
-    """Return the name of the n-th joint or actuator; models need not give them names."""
-    return part.name or f"{n}, which has no name"
-
-
-def _hulls(spec: MjSpec, mission: Mission) -> dict[str, str]:
-    """Return the shape, place and masks of all robots' hulls, by what they are of."""
-    found: dict[str, str] = {}
-    for i in range(mission.num_robots):
-        hull = _hull(spec, i)
-        for name in HULL:
-            found[f"{name} of {hull.name}"] = str(np.asarray(getattr(hull, name)).tolist())
-    return found
-
-
-def _hull(spec: MjSpec, i: int) -> MjsGeom:
-    hull = spec.geom(f"r{i}/hull")
-    if hull is None:
-        raise ValueError(f"a scene must leave the robots' hulls, but deleted r{i}/hull")
-    return hull
 
 
 def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
@@ -314,19 +212,6 @@ def _bounce(geom: MjsGeom, mission: Mission, priority: int = 0) -> None:
     geom.solref = [0.0, -2.0 / timestep_s(mission)]
     geom.solimp = ELASTIC_SOLIMP
     geom.priority = priority
-
-
-def _motion(spec: MjSpec) -> dict[str, str]:
-    """Return the numbers of joints and actuators and of MuJoCo's solver, by what they are of."""
-    named = [OF_JOINTS] * len(spec.joints) + [OF_ACTUATORS] * len(spec.actuators) + [OF_OPTIONS]
-    parts = [*spec.joints, *spec.actuators, spec.option]
-    owners = [*_moving_parts(spec), "option"]
-    motion: dict[str, str] = {}
-    for owner, part, names in zip(owners, parts, named, strict=True):
-        for name in names:
-            value = getattr(part, name)
-            motion[f"{name} of {owner}"] = str(np.asarray(value).tolist())  # nan is nan there
-    return motion
 
 
 def _place_robots(spec: MjSpec, mission: Mission, start: RobotStates) -> None:
@@ -406,7 +291,7 @@ def _fit_robots(spec: MjSpec, mission: Mission) -> None:
     for i in range(mission.num_robots):
         spec.geom(f"r{i}/beacon").size[0] = beacon_m
         if mission.collide:
-            hull = _hull(spec, i)
+            hull = hull_of(spec, i)
             hull.contype = ROBOTS_BIT
             hull.conaffinity = ROBOTS_BIT
             _bounce(hull, mission)
