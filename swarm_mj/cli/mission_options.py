@@ -11,6 +11,7 @@ from typing import Any
 from swarm_mj.cli.options import Given, Option, flags_of, nested
 from swarm_mj.evaluation.study import MAX_REGIMES
 from swarm_mj.mission import PRESETS, WORLDS, Mission, make_mission, paper
+from swarm_mj.mission.presets import DEPENDENT, usual_of
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.policy_arguments import PolicyArguments
 from swarm_mj.policies.registry import PAYLOADS, POLICIES, WITHOUT_PAYLOAD
@@ -149,17 +150,25 @@ def check_in_use(
 
 def mission_flags(*missions: Mission) -> str:
     """Return the options that make missions, without defaults except for the task."""
-    preset = Mission().preset
-    usual = [replace(PRESETS[each.preset](each.task), preset=preset) for each in missions]
     flags: list[str] = []
     for spec in SPECS:
-        values = values_of(spec.name, missions)
-        if spec.name != "task" and values == values_of(spec.name, usual):
+        if spec.name != "task" and all(_is_usual(spec.name, each) for each in missions):
             continue
+        values = values_of(spec.name, missions)
         flags.append(flags_of(spec)[0])
         if values[0] is not True:  # else it is a flag
             flags += [shlex.quote(as_typed(value)) for value in values]
     return " ".join(flags)
+
+
+def _is_usual(name: str, mission: Mission) -> bool:
+    """Return whether a mission has a field's default, so that its option may be left out."""
+    value = getattr(mission, name)
+    if name == "preset":
+        return value == Mission().preset
+    if name in DEPENDENT:
+        return value == getattr(usual_of(mission), name)
+    return value == getattr(PRESETS[mission.preset](mission.task), name)
 
 
 def values_of(name: str, missions: Sequence[Mission]) -> tuple[Any, ...]:

@@ -11,6 +11,9 @@ from swarm_mj.mission.surroundings import OPEN
 from swarm_mj.mission.team import Task
 from swarm_mj.system.fields import check_value
 
+# Fields whose defaults depend on others, as `usual_of` and every preset see to.
+DEPENDENT = ("boundary", "physics")
+
 
 def paper(task: Task = "flocking", **overrides: Unpack[MissionFields]) -> Mission:
     """Return the paper's text, taken literally.
@@ -173,6 +176,32 @@ def open_field(task: Task = "random-walk", **overrides: Unpack[MissionFields]) -
         rician_k=5.0,  # 7 dB
     )
     return _overridden(field, overrides)
+
+
+def usual_of(mission: Mission) -> Mission:
+    """Return what a mission's preset makes for its task, size, arena and robots alone.
+
+    Of the fields that have other defaults there, as the boundary has in an arena, it has those.
+
+    Args:
+        mission: Any.
+
+    Returns:
+        A mission of the same preset and task, with as many robots of that kind in that arena, which
+        collide if they do; everything else is as usual.
+
+    Example:
+        >>> usual_of(paper("flocking", arena="forest", boundary="none")).boundary
+        'reflect'
+    """
+    # The number is among them because kinds of robots have to add up to it.
+    return PRESETS[mission.preset](
+        mission.task,
+        num_robots=mission.num_robots,
+        arena=mission.arena,
+        robot=mission.robot,
+        collide=mission.collide,
+    )
 
 
 def _overridden(preset: Mission, overrides: MissionFields) -> Mission:

@@ -3,6 +3,7 @@
 import re
 import shlex
 from pathlib import Path
+from typing import get_args
 
 import pytest
 
@@ -14,6 +15,7 @@ from swarm_mj.cli.options import flags_of
 from swarm_mj.evaluation.study import Study
 from swarm_mj.learning.settings import Training
 from swarm_mj.mission import PRESETS, WORLDS, Mission, paper, reference
+from swarm_mj.mission.team import Task
 from swarm_mj.physics.arenas import ARENAS
 from swarm_mj.policies.registry import POLICIES
 from swarm_mj.system.fields import GONE_IN, former_names, meaning_of
@@ -133,6 +135,17 @@ def test_the_help_shows_every_field_that_has_help(capsys):
     assert f"what stands in the area: {', '.join(ARENAS)}, or an MJCF file" in shown
 
 
+WITH_OTHER_DEFAULTS = [  # of the boundary or the physics, and missions that have neither
+    {"arena": "forest"},
+    {"arena": "forest", "boundary": "none"},
+    {"arena": "open"},
+    {"arena": "open", "boundary": "reflect"},
+    {"arena": "open", "physics": "contact"},
+    {"arena": "open", "robot": "rover"},
+    {"arena": "blocks", "robot": "quadrotor:3,rover:2", "num_robots": 5, "boundary": "none"},
+]
+
+
 @pytest.mark.parametrize(
     "wanted",
     [
@@ -152,6 +165,14 @@ def test_the_flags_of_a_mission_make_it_again(wanted):
     assert mission(*shlex.split(mission_flags(wanted))) == wanted
 
 
+@pytest.mark.parametrize("given", WITH_OTHER_DEFAULTS)
+@pytest.mark.parametrize("preset", PRESETS)
+def test_the_flags_make_a_boundary_and_physics_again(preset, given):
+    for task in get_args(Task):
+        wanted = PRESETS[preset](task, **given)
+        assert mission(*shlex.split(mission_flags(wanted))) == wanted
+
+
 def test_the_flags_of_several_missions_make_them_all_again():
     typed = "--task stationary flocking --robots 9 --range-ratio 1 0.5 --fading none rayleigh"
     wanted = missions(*typed.split())
@@ -161,6 +182,22 @@ def test_the_flags_of_several_missions_make_them_all_again():
 
 def test_flags_leave_out_what_is_as_usual():
     assert mission_flags(paper("stationary", num_robots=9)) == "--task stationary --robots 9"
+
+
+@pytest.mark.parametrize(
+    ("wanted", "flags"),
+    [
+        (paper("flocking", arena="forest"), "--arena forest"),
+        (paper("flocking", arena="forest", boundary="none"), "--arena forest --boundary none"),
+        (paper("flocking", robot="rover"), "--robot rover"),
+        (paper("flocking", collide=True), "--collide"),
+        (PRESETS["urban"]("flocking", boundary="none"), "--boundary none"),
+        (PRESETS["urban"]("flocking", arena="open"), "--arena open"),
+    ],
+)
+def test_flags_leave_out_a_boundary_and_physics_that_go_with_the_others(wanted, flags):
+    preset = "" if wanted.preset == "paper" else f"--preset {wanted.preset} "
+    assert mission_flags(wanted) == f"{preset}--task flocking {flags}"
 
 
 SWITCHES = {
