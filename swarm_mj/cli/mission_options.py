@@ -152,7 +152,7 @@ def mission_flags(*missions: Mission) -> str:
     """Return the options that make missions, without defaults except for the task."""
     flags: list[str] = []
     for spec in SPECS:
-        if spec.name != "task" and all(_is_usual(spec.name, each) for each in missions):
+        if spec.name != "task" and all(_can_be_left_out(spec, each) for each in missions):
             continue
         values = values_of(spec.name, missions)
         flags.append(flags_of(spec)[0])
@@ -161,8 +161,12 @@ def mission_flags(*missions: Mission) -> str:
     return " ".join(flags)
 
 
-def _is_usual(name: str, mission: Mission) -> bool:
-    """Return whether a mission has a field's default, so that its option may be left out."""
+def _can_be_left_out(spec: Field[Any], mission: Mission) -> bool:
+    """Return whether a mission has a field's default, or the field does not count in it."""
+    switch = meaning_of(spec).counts_with
+    if switch is not None and not switch.is_on(mission):
+        return True  # as one of several missions it may have another value, which alone is refused
+    name = spec.name
     value = getattr(mission, name)
     if name == "preset":
         return value == Mission().preset

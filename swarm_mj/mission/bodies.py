@@ -11,6 +11,7 @@ from swarm_mj.system.fields import above_zero, other_than, setting
 
 LEAST_HEIGHT_M = 0.5  # of robots that fly: below it a set point does not sink
 POINT = "point"  # the paper's robot: a mass without size, heading or height
+ROVER = "rover"  # the robot of the package that stays on the floor
 
 
 class RobotGroup(NamedTuple):
@@ -35,6 +36,22 @@ def _split(robot: str) -> list[tuple[str, str]]:
     return found
 
 
+def _kinds(robot: str) -> list[str]:
+    """Return the kinds that a team's robots are of."""
+    return [kind for kind, _ in _split(robot)]
+
+
+def can_fly(robot: str) -> bool:
+    """Return whether some of a team's robots may fly: those of a file are taken to.
+
+    Only its model, which is not read here, says whether such a robot flies.
+
+    Args:
+        robot: Their kind or kinds, as the field of `Mission`.
+    """
+    return any(kind not in (POINT, ROVER) for kind in _kinds(robot))
+
+
 @dataclass(frozen=True, kw_only=True)
 class Bodies(Team):
     """The robots' kind, how high they fly, and the air around them."""
@@ -57,7 +74,7 @@ class Bodies(Team):
         low=LEAST_HEIGHT_M,
         high=1000.0,
         source=NEW,
-        counts_with=other_than(robot, POINT),
+        counts_with=other_than(robot, POINT, ROVER, parts=_kinds),
     )
     height_range_m: float = setting(
         0.0,
@@ -67,7 +84,7 @@ class Bodies(Team):
         low=0.0,
         high=1000.0,
         source=NEW,
-        counts_with=other_than(robot, POINT),
+        counts_with=other_than(robot, POINT, ROVER, parts=_kinds),
     )
     robot_spread: float = setting(
         0.0,

@@ -30,13 +30,19 @@ REQUIRED: Any = MISSING  # the default of a field whose value must be given
 ABOUT = "about"  # the one key of a field's metadata
 
 
+def joined_by_commas(text: str) -> list[str]:
+    """Return the choices that a text joins."""
+    return text.split(",")
+
+
 @dataclass(frozen=True)
 class Switch:
     """The state of another field for a field to count: a number above 0, or a text."""
 
     field: Field[Any]
     state: str = ""  # a text that it may be; "" is any number above 0
-    is_other: bool = False  # whether it must be any text but this one
+    others: tuple[str, ...] = ()  # texts besides which it must have another one
+    parts: Callable[[str], list[str]] = joined_by_commas  # those of which a text is made
 
     @property
     def name(self) -> str:
@@ -46,16 +52,16 @@ class Switch:
     def is_on(self, settings: object) -> bool:
         """Return whether it is so in some settings; of joined choices, one is enough."""
         value = getattr(settings, self.name)
-        if not self.state:
-            return value > 0
-        return (self.state in value.split(",")) is not self.is_other
+        if self.others:
+            return any(part not in self.others for part in self.parts(value))
+        return self.state in self.parts(value) if self.state else value > 0
 
     @property
     def needed(self) -> str:
         """The state that the other field needs, in words."""
-        if not self.state:
-            return "above 0"
-        return f"other than {self.state}" if self.is_other else self.state
+        if self.others:
+            return f"other than {' or '.join(self.others)}"
+        return self.state or "above 0"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,11 +164,16 @@ def set_to(switch: object, state: str) -> Switch:
     return Switch(switch, state)
 
 
-def other_than(switch: object, state: str) -> Switch:
-    """Return that a field counts where another one, as of `above_zero`, is a text but this one."""
+def other_than(
+    switch: object, *others: str, parts: Callable[[str], list[str]] = joined_by_commas
+) -> Switch:
+    """Return that a field counts where another one, as of `above_zero`, is a text but these.
+
+    Where its text has several `parts`, one that is another is enough.
+    """
     if not isinstance(switch, Field) or not isinstance(switch.default, str):
         raise TypeError(f"counts_with needs a text that is a `setting`, not {switch!r:.80}")
-    return Switch(switch, state, is_other=True)
+    return Switch(switch, others=others, parts=parts)
 
 
 def meaning_of(spec: Field[Any]) -> Meaning:

@@ -211,7 +211,10 @@ SWITCHES = {
     "--map-offset-m 3": "--prior-knowledge map",
     "--position-noise-s 3": "--position-noise-m above 0",
     "--wind-mps 5": "--robot other than point",
-    "--height-range-m 5": "--robot other than point",
+    "--height-range-m 5": "--robot other than point or rover",
+    "--height-m 5": "--robot other than point or rover",
+    "--height-m 5 --robot rover": "--robot other than point or rover",
+    "--height-m 5 --robot rover:20,rover:20": "--robot other than point or rover",
 }
 
 
@@ -219,7 +222,7 @@ SWITCHES = {
 @pytest.mark.parametrize("command", ["fly", "evaluate", "train --minutes 1 --out run"])
 def test_an_option_that_would_change_nothing_is_refused(command, given, capsys, here):
     assert main([*command.split(), *given.split()]) == 2
-    flag, needed = given.split()[0], SWITCHES[given]
+    flag, needed = given.split()[0], SWITCHES[given]  # what else is given leaves it off
     complaint = f"{flag} counts only with {needed}; give that too, or leave {flag} out"
     assert complaint in " ".join(capsys.readouterr().err.split())
     assert list(here.iterdir()) == []
@@ -232,6 +235,14 @@ def test_a_fraction_that_rounds_to_no_robot_makes_no_other_missions():
         (100, 0),
         (100, 1),
     ]
+
+
+def test_heights_count_where_some_robots_fly():
+    some = mission("--robot", "rover:2,quadrotor:1", "--robots", 3, "--height-m", 5)
+    assert some.height_m == 5.0
+    rovers, quadrotors = missions("--robot", "rover", "quadrotor", "--height-m", 5)
+    assert "--height-m 5" in mission_flags(quadrotors)
+    assert "--height-m" not in mission_flags(rovers)  # which alone would be refused
 
 
 def test_an_option_may_count_in_some_of_the_missions_only():

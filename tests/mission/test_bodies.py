@@ -1,7 +1,8 @@
 import pytest
 
 from swarm_mj.mission import Mission, paper
-from swarm_mj.mission.bodies import RobotGroup
+from swarm_mj.mission.bodies import RobotGroup, can_fly
+from swarm_mj.physics.robots import SHIPPED, kinds_of
 
 
 def test_points_have_two_axes_and_bodies_three():
@@ -20,6 +21,25 @@ def test_several_kinds_share_the_team_in_order():
 
 def test_a_preset_moves_bodies_by_forces():
     assert paper(robot="quadrotor").physics == "contact"
+
+
+@pytest.mark.parametrize(
+    ("robot", "flies"),
+    [
+        ("point", False),
+        ("rover:2,rover:3", False),
+        ("rover:2,quadrotor:3", True),
+        ("rover:3,mine.xml:2", True),
+    ],
+)
+def test_a_team_flies_if_some_of_it_may(robot, flies):
+    assert can_fly(robot) == flies
+
+
+@pytest.mark.parametrize("robot", SHIPPED)
+def test_the_packages_robots_fly_if_their_models_do(robot):
+    (kind,) = kinds_of(paper(robot=robot))
+    assert can_fly(robot) == kind.is_free
 
 
 @pytest.mark.parametrize(

@@ -88,6 +88,9 @@ class Oven:
     steam_s: float = setting(5.0, low=1.0, high=60.0, counts_with=above_zero(steam))
     dish: str = setting("tray", "")
     lid_mm: float = setting(2.0, low=1.0, high=9.0, counts_with=other_than(dish, "tray"))
+    oil_ml: float = setting(
+        2.0, low=1.0, high=9.0, counts_with=other_than(dish, "tray", "pot", parts=str.split)
+    )
     light: bool = False
 
 
@@ -97,17 +100,21 @@ def test_a_field_says_with_which_other_one_it_counts():
         "fan_rpm": "heat",
         "steam_s": "steam",
         "lid_mm": "dish",
+        "oil_ml": "dish",
     }
     assert [each.needed for each in switches.values() if each] == [
         "fan",
         "above 0",
         "other than tray",
+        "other than tray or pot",
     ]
     for oven, counting in (
         (Oven(heat="top"), set()),
         (Oven(heat="fan"), {"fan_rpm"}),
         (Oven(heat="top,fan", steam=0.5), {"fan_rpm", "steam_s"}),  # of joined choices, one
         (Oven(dish="pot"), {"lid_mm"}),
+        (Oven(dish="pot tray"), {"lid_mm"}),
+        (Oven(dish="pot pan"), {"lid_mm", "oil_ml"}),  # of several parts, one
     ):
         assert {name for name, each in switches.items() if each and each.is_on(oven)} == counting
 
