@@ -11,6 +11,7 @@ from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
 from swarm_mj.mission.faults import MIN_SURVIVORS
+from swarm_mj.mission.words import bodies_in_words, robots_in_words
 from swarm_mj.policies.about import NO_PAYLOAD
 from swarm_mj.policies.policy import Policy
 from swarm_mj.protocol.agreement import AGREED, perfect_rate
@@ -18,6 +19,7 @@ from swarm_mj.protocol.mission_costs import AOI, TASK_COST, VELOCITY_VARIANCE, M
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second, where_flown
 from swarm_mj.simulation.rollout import Count, FlownCosts, SomeCount, Summary
+from swarm_mj.system.shares import percent
 
 CENTRE = "no: a centre knows all positions"
 FATES = {  # rows of the table: a count among the numbers, and its share of the packets sent
@@ -62,12 +64,14 @@ def flight_numbers(mission: Mission, policy: Policy, summary: Summary) -> dict[s
 
 def flight_title(mission: Mission, policy: str, seed: int) -> str:
     """Return mission, policy and seed in a line."""
-    team = f"{mission.num_robots} robots"
+    team = robots_in_words(mission)
     if mission.collide:
         team += " that collide"
     if mission.failure_fraction:
         team += f", {mission.failure_fraction:.0%} of them off half-way"
-    return ", ".join([mission.task, policy, team, f"seed {seed}", *where_flown(mission)])
+    bodies = bodies_in_words(mission.robot, vars(mission))
+    words = [mission.task, policy, team, *bodies, f"seed {seed}", *where_flown(mission)]
+    return ", ".join(words)
 
 
 def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
@@ -85,7 +89,7 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
 
     complete = summary.complete_window
     if complete is None:
-        shown_how = f"never; {summary.heard_share:.0%} of pairs at the end"
+        shown_how = f"never; {percent(summary.heard_share)} of pairs at the end"
     else:
         shown_how = f"after {_windows(complete, mission, 0)}"
     rows["all pairs first informed"] = shown_how
@@ -99,7 +103,8 @@ def flight_rows(mission: Mission, summary: FlightSummary) -> dict[str, str]:
         carried += f" and {summary.payload}"
     rows["packets carry"] = carried
     rate = bits_per_second(BITS_PER_BYTE * summary.bytes_per_second)
-    rows["  bytes each; sent by the team"] = f"{summary.packet_bytes:,}; {rate}"
+    rows["  bytes each"] = f"{summary.packet_bytes:,}"
+    rows["  sent by the team"] = rate
     rows["decentralised"] = CENTRE if summary.is_centralised else "yes"
     rows |= _task_costs(mission, summary)
     if summary.crashed is not None:
@@ -138,7 +143,7 @@ def _packets(summary: FlightSummary) -> dict[str, str]:
         count = summary[name]
         if count is None:  # of packets of the other kind
             continue
-        rows[label] = f"{count} ({count / sent:.0%})" if sent else f"{count}"
+        rows[label] = f"{count} ({percent(count / sent)})" if sent else f"{count}"
     if is_broadcast:
         hearers = summary.hearers_per_packet
         rows["  robots that heard a packet, mean"] = "-" if hearers is None else f"{hearers:.2f}"
@@ -177,7 +182,9 @@ def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:
         if summary.decay_rate is not None:
             fall = 1.0 - math.exp(-summary.decay_rate)
             law = 1.0 - math.exp(-perfect_rate(mission.window_s))
-            rows["  falls at first by"] = f"{fall:.0%} a window ({law:.0%} if all knew all)"
+            rows["  falls at first by"] = (
+                f"{percent(fall)} a window ({percent(law)} if all knew all)"
+            )
         if summary.strayed:
             rows["  robots out of everyone's range"] = f"{summary.strayed} at the end"
     return rows

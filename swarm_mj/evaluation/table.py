@@ -13,6 +13,7 @@ from swarm_mj.evaluation.results import (
     LARGER_PACKETS,
     Result,
     carries_more,
+    config_of,
     has_memory,
     mission_field,
 )
@@ -22,8 +23,10 @@ from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.knowledge import NOTHING
 from swarm_mj.mission.presets import paper
 from swarm_mj.mission.surroundings import OPEN
+from swarm_mj.mission.words import bodies_in_words
 from swarm_mj.protocol.packets import BITS_PER_BYTE
 from swarm_mj.radio.words import bits_per_second
+from swarm_mj.system.shares import percent
 
 MIN_WIDTH = 100  # of a table; narrower consoles wrap its lines rather than cut numbers off
 NAME_WIDTH = 17  # of a policy that fits in there; a longer path widens the table
@@ -121,28 +124,9 @@ def _density(result: Result) -> str | None:
     return None if per_km2 in (None, Mission().density_per_km2) else f"{per_km2:g}/km²"
 
 
-# What is said of robots with bodies, in this order, unless it is as usual: the numbers' fields.
-OF_BODIES = {
-    "height_range_m": "to {:g} m higher",
-    "wind_mps": "wind {:g} m/s",
-    "gust_mps": "gusts {:g} m/s",
-    "gust_s": "over {:g} s",
-    "robot_spread": "spread {:g}",
-}
-
-
 def _bodies(result: Result) -> str:
     """Return the robots' kind, how high they fly, and the wind, in words."""
-    usual = Mission()
-    said = result.robot
-    height_m = mission_field(result, "height_m")
-    if height_m is not None:
-        said += f", at {height_m:g} m"
-    for name, words in OF_BODIES.items():
-        value = mission_field(result, name)
-        if value is not None and value != getattr(usual, name):
-            said += f", {words.format(value)}"
-    return said
+    return ", ".join([result.robot, *bodies_in_words(result.robot, config_of(result))])
 
 
 def _table(results: Sequence[Result], columns: Sequence[Shown], *, gap: int) -> Table:
@@ -186,7 +170,7 @@ def _below(results: Sequence[Result], *, is_wide: bool) -> Iterator[str]:
             kbit_per_s = BITS_PER_BYTE * result.bytes_per_second / 1000.0
             sent.append(f"{result.policy} {kbit_per_s:,.1f}")
         if result.complete_share < 0.5:
-            late.append(f"{result.policy} {result.complete_share:.0%}")
+            late.append(f"{result.policy} {percent(result.complete_share)}")
         if result.aoi_floor_mean is not None:
             bounds.append(result.aoi_floor_mean)
     if sent and is_wide:

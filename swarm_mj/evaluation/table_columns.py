@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 from swarm_mj.evaluation.results import Result, has_own_cost, is_flock
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
+from swarm_mj.system.shares import percent
 
 NONE = "-"  # a cell of what does not exist
 VARIANCE_FORM = f".{VELOCITY_VARIANCE.digits}f"
@@ -53,7 +54,7 @@ def interval(low: float | None, high: float | None) -> str:
 def _reached(result: Result) -> str:
     """Return the share of requests that reached their addressee, of broadcasts anybody."""
     reached = result.heard_ratio if result.delivery_ratio is None else result.delivery_ratio
-    return number(reached, ".0%")
+    return NONE if reached is None else percent(reached)
 
 
 def _difference(result: Result) -> str:
@@ -68,12 +69,12 @@ def _difference_in_a_line(result: Result) -> str:
 
 
 def _complete(result: Result) -> str:
-    return f"{result.complete_share:.0%}"
+    return percent(result.complete_share)
 
 
 def _agreed(result: Result) -> str:
     """Return the share of flocks that agreed and, if half did, by when in the median."""
-    share = number(result.agreed_share, ".0%")
+    share = NONE if result.agreed_share is None else percent(result.agreed_share)
     median = result.agreed_window_median
     return share if median is None else f"{share}, {median:.0f}"
 
@@ -127,8 +128,8 @@ AGE_MEANING = (
 )
 
 AGREED_MEANING = (
-    "Agreed: flocks that ended with under 1% of their first variance, and from which window on "
-    "they had, a median."
+    "Agreed: flocks that ended with under 1% of their first variance, and the median window from "
+    "which they had."
 )
 COMPLETE_MEANING = "All: missions that ended with everyone having heard of everyone."
 

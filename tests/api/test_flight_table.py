@@ -32,12 +32,19 @@ def summary(**numbers):
     return Summary(**(dict.fromkeys(names, NAN) | given | {"num_windows": 100}))
 
 
-def shown(policy_name, task, its, strayed=0, crashed=None, energy_j=(None, None)):
+def shown(
+    policy_name, task, its, strayed=0, crashed=None, energy_j=(None, None), heard_share=0.254
+):
     """The table's rows as a mapping, and all its text."""
     mission = paper(task, num_robots=7)
     policy = make_policy(policy_name, mission)
     numbers = flight_numbers(mission, policy, its)
-    ended = {"wall_seconds": 1.5, "interrupted": False, "heard_share": 0.254, "strayed": strayed}
+    ended = {
+        "wall_seconds": 1.5,
+        "interrupted": False,
+        "heard_share": heard_share,
+        "strayed": strayed,
+    }
     ended["crashed"] = crashed
     ended["energy_mean_j"], ended["energy_worst_j"] = energy_j
     rows = flight_rows(mission, FlightSummary(**numbers, **ended))
@@ -74,7 +81,8 @@ ROWS = [  # policy, task, numbers, and the rows that they make
             "answered, and the answer heard": "40 (20%)",
             "overheard by other robots": "600 times",
             # Header 3 and 7 entries of 9 are 66 bytes; 250 of them in 10 s are 13.2 kbit/s.
-            "bytes each; sent by the team": "66; 13.2 kbit/s",
+            "bytes each": "66",
+            "sent by the team": "13.2 kbit/s",
         },
     ),
     (
@@ -112,6 +120,14 @@ def test_robots_that_nobody_reaches_any_more_have_a_row():
     flock = summary(**BROADCAST)
     assert shown("tdma", "flocking", flock, strayed=2)[0][row] == "2 at the end"
     assert row not in shown("tdma", "flocking", flock)[0]
+
+
+def test_what_is_not_all_is_not_shown_as_all():
+    most = summary(packets_sent=675.0, packets_transmitted=675.0, packets_heard=672.0)
+    most = replace(most, complete_window=NAN)
+    rows = shown("tdma", "random-walk", most, heard_share=0.9993)[0]
+    assert rows["heard by at least one robot"] == "672 (>99%)"
+    assert rows["all pairs first informed"] == "never; >99% of pairs at the end"
 
 
 def test_only_bodies_crash():
@@ -184,7 +200,15 @@ def test_a_task_with_a_cost_of_its_own_shows_that_instead_of_velocities():
         ),
         (paper("flocking", bit_rate=250e3), "flocking, tdma, 40 robots, seed 3, 250 kbit/s"),
         (PRESETS["urban"](), "random-walk, tdma, 40 robots, seed 3, preset urban"),
+        (
+            paper("flocking", robot="rover", arena="forest", num_robots=6),
+            "flocking, tdma, 6 rovers, seed 3, arena forest",
+        ),
+        (
+            paper("stationary", robot="quadrotor", wind_mps=30.0, collide=True),
+            "stationary, tdma, 40 quadrotors that collide, at 20 m, wind 30 m/s, seed 3",
+        ),
     ],
 )
-def test_the_title_names_the_arena_and_what_the_channel_adds(mission, title):
+def test_the_title_names_the_robots_the_arena_and_what_the_channel_adds(mission, title):
     assert flight_title(mission, "tdma", 3) == title

@@ -227,6 +227,7 @@ def test_the_lower_bound_stands_below(printed):
             {"robot": "quadrotor", "config": '{"height_m": 20.0, "wind_mps": 5.0}'},
             ",\nrobot quadrotor, at 20 m, wind 5 m/s\n",
         ),
+        ({"robot": "rover", "config": '{"height_m": 20.0}'}, ",\nrobot rover\n"),
         ({"radio": "fading rayleigh"}, ",\nradio fading rayleigh\n"),
         ({"prior_knowledge": "map,start"}, ",\nprior knowledge map,start\n"),
         ({"channel": "my:Radio"}, ",\nchannel my:Radio\n"),
@@ -270,7 +271,7 @@ def other_fields(spec):
     switch = about.counts_with
     if switch is None:
         needed = {}
-    elif switch.is_other:
+    elif switch.others:
         needed = AMONG_BODIES
     else:
         needed = {switch.name: switch.state or 2.0}
