@@ -18,7 +18,7 @@ from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import commit, is_installed, need, version
-from swarm_mj.system.terminal import num_cores, plain_console, tell_cores
+from swarm_mj.system.terminal import num_cores, plain_console, say_written, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 WORLD_MISSIONS = 32  # side by side, among obstacles and under fading
@@ -95,6 +95,9 @@ def run(options: BenchOptions) -> int:
     plain_console().print(f"{LEGEND}\n{noise(steps_us)}")
     if options.json:
         write_json(options.json, document(options, tables, steps_us))
+        say_written(options.json)
+    if options.plot:
+        say_written(options.plot)
     return DONE
 
 

@@ -1,6 +1,5 @@
 """`swarm-mj check`: flies missions until it is certain whether enough of them converge in time."""
 
-import shlex
 from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
@@ -29,7 +28,7 @@ from swarm_mj.system.fields import common_setting, files_read, same_as, setting
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import WorkBar, num_cores, plain_console
+from swarm_mj.system.terminal import WorkBar, num_cores, plain_console, say_written
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 MOST_JOBS = 8  # unless asked for: a process takes 0.3 GB, and seconds to start
@@ -150,6 +149,7 @@ def _report(options: CheckOptions, found: Convergence) -> None:
         plain_console().print(repr(found))
         if options.json:
             write_json(options.json, found.report())
+            say_written(options.json)
         if options.plot:
             _write_chart(options.plot, found)
 
@@ -164,4 +164,4 @@ def _write_chart(path: Path, found: Convergence) -> None:
     from swarm_mj.evaluation.figures.style import save  # matplotlib is slow to import
 
     save(found.plot(), path)
-    plain_console().print(f"Wrote {shlex.quote(str(path))}")
+    say_written(path)

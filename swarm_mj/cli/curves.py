@@ -27,7 +27,7 @@ from swarm_mj.mission import Mission
 from swarm_mj.protocol.mission_costs import AOI
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, files_read, setting
-from swarm_mj.system.terminal import plain_console
+from swarm_mj.system.terminal import plain_console, say_written
 from swarm_mj.system.writing import Output, check_outputs, write_csv
 
 if TYPE_CHECKING:  # matplotlib is slow to import
@@ -93,10 +93,10 @@ def run(options: CurvesOptions) -> int:
         if len(lines) < len(runs):
             origin += "; mean over seeds, and their range"
         save(draw_learning(lines, levels, origin), options.plot)
-        console.print(f"Wrote {options.plot}")
+        say_written(options.plot)
     if options.csv:
         _write_csv(options.csv, runs)
-        console.print(f"Wrote {options.csv}")
+        say_written(options.csv)
     return DONE
 
 

@@ -1,6 +1,5 @@
 """`swarm-mj export`: writes a replay as files that other tools read."""
 
-import shlex
 from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
@@ -12,7 +11,7 @@ from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import files_read, setting, the_file
 from swarm_mj.system.interrupt import held_interrupts, raise_if_interrupted
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.terminal import WorkBar, say_written
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
 ENDINGS = {".rrd", ".mcap", ".tcl", ".csv"}  # of files: those of a format may be typed, too
@@ -64,8 +63,7 @@ def run(options: ExportOptions) -> int:
         for file, content in contents.items():
             write_bytes(file, content)
     for file, content in contents.items():
-        size = f"{len(content) / 1e3:,.0f} kB"
-        plain_console().print(f"Wrote {shlex.quote(str(file))}: {size}")
+        say_written(file, f"{len(content) / 1e3:,.0f} kB")
     return DONE
 
 

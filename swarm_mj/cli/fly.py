@@ -33,7 +33,7 @@ from swarm_mj.system.fields import common_setting, files_read
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits
 from swarm_mj.system.packages import is_installed, missing, need
-from swarm_mj.system.terminal import plain_console, this_command
+from swarm_mj.system.terminal import plain_console, say_written, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 REPLAYS = Path("replays")
@@ -121,6 +121,8 @@ def _fly(
             stack.callback(lambda: flown.recorded.save(path))
         if options.json:
             write_json(options.json, flown.run.report(path))
+    if options.json:
+        say_written(options.json)
     for label, line in _next_commands(options, path):
         plain_console().print(f"{label:18}{line}")
     if flown.ending:

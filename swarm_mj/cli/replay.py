@@ -1,7 +1,6 @@
 """`swarm-mj replay`: opens recorded missions, or makes a video or a picture of them."""
 
 import re
-import shlex
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
@@ -17,7 +16,7 @@ from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import GONE_IN, files_read, setting, the_file
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import WorkBar, plain_console
+from swarm_mj.system.terminal import WorkBar, plain_console, say_written
 from swarm_mj.system.user_code import files_named, is_own
 from swarm_mj.system.writing import Output, check_outputs, write_bytes
 
@@ -140,7 +139,7 @@ def _draw_picture(options: ReplayOptions, picture: Path) -> int:
 
         footage = _in_scene(read_footage(file), options.scene)
         save(draw_picture(footage, options.window), picture)
-    plain_console().print(f"Wrote {shlex.quote(str(picture))}")
+    say_written(picture)
     return DONE
 
 
@@ -162,9 +161,8 @@ def _make_video(options: ReplayOptions, video: Path) -> int:
     raise_if_interrupted()  # an encoder may have swallowed it
     write_bytes(video, content)
     number = style.num_frames
-    name = shlex.quote(str(video))
     about = f"{number / style.fps:.3g} s, {number} pictures of {style.width} by {style.height}"
-    plain_console().print(f"Wrote {name}: {about}, {len(content) / 1e6:.1f} MB")
+    say_written(video, f"{about}, {len(content) / 1e6:.1f} MB")
     return DONE
 
 

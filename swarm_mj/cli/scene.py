@@ -16,7 +16,7 @@ from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import files_read, same_as, setting
 from swarm_mj.system.interrupt import raise_if_interrupted
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import plain_console, this_command
+from swarm_mj.system.terminal import plain_console, say_written, this_command
 from swarm_mj.system.writing import Output, check_outputs, write_text
 
 if TYPE_CHECKING:  # MuJoCo is slow to import
@@ -67,8 +67,8 @@ def _write(options: SceneOptions, out: Path) -> int:
     write_text(out, spec.to_xml())
     side = f"{mission.side_m:.0f} m"
     file = shlex.quote(str(out))
+    say_written(out, f"{mission.num_robots} robots on {side} by {side}")
     plain_console().print(
-        f"Wrote {out}: {mission.num_robots} robots on {side} by {side}\n"
         "The viewer opens on their start; Load key also gives them their velocities.\n"
         f"Open it:  {this_command('python')} -m mujoco.viewer --mjcf={file}"
     )

@@ -2,6 +2,7 @@
 
 import math
 import os
+import shlex
 import shutil
 import sys
 import time
@@ -20,6 +21,12 @@ SPEED_OVER_S = 600.0  # several rollouts of a training, and evaluations between 
 def plain_console(*, is_error: bool = False) -> Console:
     """Return a terminal that shows text as it is: no colours, no broken lines, no markup."""
     return Console(stderr=is_error, highlight=False, soft_wrap=True, markup=False)
+
+
+def say_written(path: Path, more: str = "") -> None:
+    """Say on the terminal that a file was written, and how large it is or what it holds."""
+    about = f": {more}" if more else ""
+    plain_console().print(f"Wrote {shlex.quote(str(path))}{about}")
 
 
 def is_notebook() -> bool:

@@ -29,7 +29,9 @@ def test_bench_prints_the_whole_and_its_parts(succeed, tmp_path):
     assert "Learning" not in done.stdout
     assert tables[-1]["title"].startswith("Robots with bodies: 40 quadrotors")
     assert tables[-1]["columns"] == ["8", "32"]
-    assert "noise: the plain step was measured 6 times, from" in done.stdout.splitlines()[-1]
+    noise, written = done.stdout.splitlines()[-2:]
+    assert "noise: the plain step was measured 6 times, from" in noise
+    assert written == "Wrote b.json"
 
 
 @pytest.fixture

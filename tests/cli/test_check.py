@@ -42,6 +42,7 @@ def test_the_exit_code_is_the_verdict(swarm_mj, tmp_path, claim, code, verdict):
     done = swarm_mj("check", "flocking", *SMALL, *claim, "--json", "a.json", "--plot", "a.svg")
     assert done.returncode == code, done.stderr
     assert f"verdict:    {verdict}\n" in done.stdout
+    assert done.stdout.endswith("Wrote a.json\nWrote a.svg\n")
     told = json.loads((tmp_path / "a.json").read_text())
     assert told["verdict"] == verdict
     assert (tmp_path / "a.svg").read_bytes().startswith(b"<?xml")

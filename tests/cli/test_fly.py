@@ -47,10 +47,11 @@ def test_without_rerun_a_flight_says_that_it_records_nothing(monkeypatch, tmp_pa
 
 
 def test_a_summary_is_what_the_library_computes(succeed, tmp_path):
-    succeed(
+    done = succeed(
         "fly", *SHORT, "--task", "random-walk", "--policy", "random-flooding", "--seed", 7,
         "--probability", 0.2, "--no-record", "--json", "out/summary.json",
     )  # fmt: skip
+    assert done.stdout.count("Wrote") == done.stdout.count("Wrote out/summary.json\n") == 1
     assert files(tmp_path) == ["out/summary.json"]
     summary = json.loads((tmp_path / "out" / "summary.json").read_text())
     mission = paper("random-walk", num_robots=6, num_windows=20, range_ratio=0.5)
