@@ -1,7 +1,6 @@
 """`swarm-mj evaluate`: policies over the same missions, with error bars."""
 
 import math
-import shlex
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -40,7 +39,7 @@ from swarm_mj.system.fields import common_setting, files_read, same_as
 from swarm_mj.system.interrupt import deferred_interrupt
 from swarm_mj.system.needs import YES, check_fits, memory_errors
 from swarm_mj.system.packages import need
-from swarm_mj.system.terminal import plain_console, tell_cores
+from swarm_mj.system.terminal import say_written, tell_cores
 from swarm_mj.system.writing import Output, check_outputs, owned
 
 LINE_EVERY_S = 30.0  # where no bar can be drawn, such as in the log of a cluster's job
@@ -198,7 +197,7 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     except (KeyboardInterrupt, MemoryError) as error:
         is_memory = isinstance(error, MemoryError)
         ending = "Out of memory" if is_memory else "Interrupted"
-        hint = "the same command with --resume continues" if kept else "nothing was kept"
+        hint = _way_on(kept, costs)
         console.print(f"{ending} {_how_far(study, costs)}; {hint}.")
         return FAILED if is_memory else INTERRUPTED
     with deferred_interrupt():
@@ -209,11 +208,25 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
             kept.unlink()
     results = [each.result for each in evaluated]
     print_results(results, is_wide=options.wide)
-    if options.plot:
-        _write_chart(options.plot, results)
+    _say_written(options, results)
     if options.files and not header["commit"]:
         console.print(COMMIT_UNKNOWN, soft_wrap=True)
     return DONE
+
+
+def _say_written(options: StudyFlags, results: Sequence[Result]) -> None:
+    """Name the files of the results, and draw and name the chart."""
+    for path in options.files:
+        say_written(path)
+    if options.plot:
+        _write_chart(options.plot, results)
+
+
+def _way_on(kept: Path | None, costs: Mapping[int, BatchCosts]) -> str:
+    """Return what became of the missions of a study that was broken off, and how to go on."""
+    if not costs:
+        return "none was flown to its end yet, so nothing is kept"
+    return "the same command with --resume continues" if kept else "nothing was kept"
 
 
 def _how_far(study: Study, costs: Mapping[int, BatchCosts]) -> str:
@@ -226,22 +239,21 @@ def _kept_if_flown(
 ) -> Iterator[None]:
     """Say after an error how to go on; remove the progress file if it has no missions.
 
-    Such a file would only make the corrected command ask for `--force`.
+    Such a file would only make the next command ask for `--force`. The caller has the words for
+    an interruption, and for memory that does not suffice.
     """
     try:
         yield
-    except Exception as error:
-        if not kept or isinstance(error, MemoryError):
-            raise
-        if costs:
+    except (Exception, KeyboardInterrupt) as error:
+        if kept and not costs:
+            kept.unlink(missing_ok=True)
+        elif kept and not isinstance(error, (MemoryError, KeyboardInterrupt)):
             console.print(
                 f"Failed {_how_far(study, costs)}; the same command with --resume continues. If "
                 "the study's own code must change first, start over with --force: missions of "
                 "changed code are not mixed with those flown.",
                 soft_wrap=True,
             )
-        else:
-            kept.unlink(missing_ok=True)
         raise
 
 
@@ -259,7 +271,7 @@ def _write_chart(path: Path, results: Sequence[Result]) -> None:
     from swarm_mj.evaluation.figures.style import save
 
     save(draw_evaluation(results), path)
-    plain_console().print(f"Wrote {shlex.quote(str(path))}")
+    say_written(path)
 
 
 def _progress_file(options: StudyFlags, outputs: Iterable[Output]) -> Path | None:

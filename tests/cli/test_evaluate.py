@@ -30,6 +30,7 @@ def whole(forks, tmp_path_factory):
     done = forks.run(folder, "swarm_mj", "evaluate", *TWO_POLICIES, *BOTH)
     assert done.returncode == 0, done.stderr
     assert files(folder) == ["r.csv", "r.json"]
+    assert done.stdout.endswith("\nWrote r.json\nWrote r.csv\n")
     return folder
 
 
@@ -138,6 +139,22 @@ def test_ctrl_c_keeps_what_was_flown_and_resuming_ends_in_the_same_files(
     assert len(lines) == 1 + count
     succeed("evaluate", *TWO_POLICIES, *BOTH, "--resume", "--jobs", 3 - jobs)
     same_files(tmp_path, whole)
+
+
+def test_ctrl_c_before_a_mission_is_flown_leaves_nothing_in_the_way(here, monkeypatch, capsys):
+    """An empty progress file made the same command ask for --resume or --force."""
+
+    def interrupted(*_, **__):
+        raise KeyboardInterrupt
+
+    command = ["evaluate", *BRIEF, "--robots", "3", "--json", "a.json"]
+    with monkeypatch.context() as patch:
+        patch.setattr("swarm_mj.evaluation.flying.fly_study", interrupted)
+        assert main(command) == 130
+    said = " ".join(capsys.readouterr().err.split())
+    assert "after 0 of 2 missions; none was flown to its end yet, so nothing is kept." in said
+    assert files(here) == []
+    assert main(command) == 0
 
 
 def test_a_killed_evaluation_resumes_with_only_what_is_left(evaluate_and_end, tmp_path, whole):
