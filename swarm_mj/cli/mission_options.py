@@ -209,11 +209,11 @@ several_missions = partial(nested, partial(mission_options, is_many=True), missi
 
 
 def _default_of(spec: Field[Any]) -> str:
-    """Return a mission's default; where it depends on the task, the flock's and the others'."""
+    """Return a mission's default; the boundary's depends on the task and the arena."""
     flocks = as_typed(getattr(USUAL_FLOCK, spec.name))
     others = as_typed(getattr(USUAL_OTHER, spec.name))
     if spec.name == "task":
         return f"{flocks}; {PRESETS[next(iter(WORLDS))]().task} under {', '.join(WORLDS)}"
     if flocks == others:
         return flocks if kind_of(spec) is not bool else ""
-    return f"{others}; {flocks} for flocks, as in the paper"
+    return f"{flocks} for flocks in open areas, else {others}"

@@ -29,7 +29,7 @@ class Dynamics:
     )
     boundary: Boundary = setting(
         "reflect",
-        "what happens at the edge; obstacles need reflect",
+        "what happens at the edge of the area",
         label="boundary",
         source="IV-A",
         choices=get_args(Boundary),

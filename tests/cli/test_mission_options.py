@@ -133,6 +133,7 @@ def test_the_help_shows_every_field_that_has_help(capsys):
         assert f"{flags_of(spec)[0]} " in shown
         assert meaning_of(spec).help in shown
     assert f"what stands in the area: {', '.join(ARENAS)}, or an MJCF file" in shown
+    assert "reflect, none (default: none for flocks in open areas, else reflect)" in shown
 
 
 WITH_OTHER_DEFAULTS = [  # of the boundary or the physics, and missions that have neither
