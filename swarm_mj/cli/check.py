@@ -134,8 +134,9 @@ def run(options: CheckOptions) -> int:
         console.print(f"{ending} before the first missions were done.")
         return code
     (asked,) = study.policies
-    if found.policy != asked:
-        console.print(registry.FLOWN_AS)
+    note = registry.note_on(asked, options.mission)
+    if note:
+        console.print(note)
     _report(options, found)
     if ending:
         console.print(f"{ending} after {found.num_missions} missions; these are shown.")

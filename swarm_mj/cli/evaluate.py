@@ -186,8 +186,8 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     engine = options.engine_for(study)
     tell_cores(options.jobs_here)
     console = Console(stderr=True, highlight=False)
-    if study.pairs != list(product(study.regimes, study.policies)):
-        console.print(registry.FLOWN_AS)
+    for note in _notes_on(study):
+        console.print(note)
     header = study.header()
     costs = _begun(kept, header, is_resumed=options.resume) if kept else {}
     try:
@@ -212,6 +212,14 @@ def _evaluate(options: StudyFlags, study: Study, kept: Path | None) -> int:
     if options.files and not header["commit"]:
         console.print(COMMIT_UNKNOWN, soft_wrap=True)
     return DONE
+
+
+def _notes_on(study: Study) -> list[str]:
+    """Return what is to be said of policies that fly otherwise than by their names, each once."""
+    notes: dict[str, None] = {}
+    for regime, policy in product(study.regimes, study.policies):
+        notes[registry.note_on(policy, regime)] = None
+    return [note for note in notes if note]
 
 
 def _say_written(options: StudyFlags, results: Sequence[Result]) -> None:

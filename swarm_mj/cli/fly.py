@@ -85,7 +85,8 @@ def run(options: FlyOptions) -> int:
     check_live(options.live, options.speed)
     _check_memory(options, path)
     console = Console(stderr=True, highlight=False)
-    flown_as = [registry.FLOWN_AS] if options.policy != asked else []
+    note = registry.note_on(asked, mission)
+    flown_as = [note] if note else []
     if options.live is None:
         return _fly(options, path, console, flown_as)
     with open_viewer(options.live, console) as viewer:

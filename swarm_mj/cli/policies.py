@@ -20,6 +20,7 @@ from swarm_mj.policies.registry import (
     flown_name,
     is_own_policy,
     make_policy,
+    note_on,
 )
 from swarm_mj.system.exit_codes import DONE
 from swarm_mj.system.fields import as_typed, common_setting, setting
@@ -109,7 +110,9 @@ def _print_one(each: dict[str, Any], policy: Policy, mission: Mission) -> None:
     Console(highlight=False).print(named_values(each["name"], rows), packet)
     typed = each["name"] if each["name"] in POLICIES else shlex.quote(each["name"])
     fly = f"{this_command()} fly --policy {typed} {mission_flags(mission)}"
-    plain_console().print(f"{each['description']}\n\nFly it:  {fly}")
+    note = note_on(each["name"], mission)
+    said = f"{each['description']}\n\n{note}." if note else each["description"]
+    plain_console().print(f"{said}\n\nFly it:  {fly}")
 
 
 def _beyond_paper(each: dict[str, Any]) -> dict[str, str]:

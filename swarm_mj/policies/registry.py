@@ -23,6 +23,7 @@ from swarm_mj.policies.gnn.turn_features import TurnFeatures
 from swarm_mj.policies.index.policy import IndexCsma
 from swarm_mj.policies.learned import LearnedPolicy
 from swarm_mj.policies.planner.resting import WITHOUT_PAYLOAD
+from swarm_mj.policies.planner.settings import PlannerSettings
 from swarm_mj.policies.policy import (
     CentralisedPolicy,
     DecentralisedPolicy,
@@ -118,6 +119,11 @@ VARIANTS = _variants()
 # What `--payload` takes. At rest the planner's own is links, which this name stands for as well.
 PAYLOADS = (*(LISTED[name].payload_name for name in VARIANTS), NO_PAYLOAD)
 FLOWN_AS = f"{WITHOUT_PAYLOAD} flies as spatial-tdma where robots move: they agree on no plan"
+MOST_WITHOUT_PLAN = PlannerSettings().min_planned_robots - 1
+TAKES_TURNS = (
+    f"planner flies as tdma in teams of up to {MOST_WITHOUT_PLAN} robots: a plan would gain them "
+    "little"
+)
 HAVE_PROBABILITY = tuple(
     name for name in POLICIES if issubclass(CLASSES.get(name, Policy), RandomTransmission)
 )
@@ -209,8 +215,16 @@ def _check_known(name: str) -> None:
         raise ValueError(
             f"policy must be one of {', '.join(POLICIES)}, a run's folder or a {SUFFIX} file with "
             f"a learned policy, or module:Name of your own, not {name!r}"
-            f"{did_you_mean(name, POLICIES)}"
+            f"{_hint_at(name)}"
         )
+
+
+def _hint_at(name: str) -> str:
+    """Return how a complaint about a policy's name ends: by what is meant, if that is likely."""
+    parts = name.split(",")
+    if len(parts) > 1 and not set(parts).isdisjoint(POLICIES):
+        return f"; separate several by spaces: `swarm-mj evaluate --policy {' '.join(parts)}`"
+    return did_you_mean(name, POLICIES)
 
 
 def _learned(arguments: PolicyArguments, name: str, mission: Mission) -> Policy:
@@ -334,6 +348,22 @@ def flown_name(name: str, mission: Mission) -> str:
     and charts say so, and show it once.
     """
     return "spatial-tdma" if name == WITHOUT_PAYLOAD and mission.moves else name
+
+
+def note_on(name: str, mission: Mission) -> str:
+    """Return what is to be said of a policy that flies a mission otherwise than by its name.
+
+    Args:
+        name: Of the policy that was asked for.
+        mission: What is flown.
+
+    Returns:
+        A line; empty if there is nothing to say.
+    """
+    if flown_name(name, mission) != name:
+        return FLOWN_AS
+    is_planner = name in VARIANTS or name in VARIANTS.values()
+    return TAKES_TURNS if is_planner and mission.num_robots <= MOST_WITHOUT_PLAN else ""
 
 
 def with_payload(names: Sequence[str], payload: str) -> list[str]:

@@ -12,6 +12,7 @@ from swarm_mj.cli import main, parse
 from swarm_mj.evaluation.results import COLUMNS, CONVERGENCE
 from swarm_mj.evaluation.results_files import read_results
 from swarm_mj.mission import paper
+from swarm_mj.policies import registry
 from swarm_mj.policies.registry import POLICIES, make_policy
 from swarm_mj.simulation.rollout import rollout, summarise
 from swarm_mj.simulation.swarm import Swarm
@@ -65,6 +66,16 @@ def test_a_planner_without_payload_that_moves_is_said_to_be_spatial_tdma(
     asked = ("--policy", "planner", "--payload", "none", "--task", task)
     said = succeed(*command.split(), *SMALL, *asked).stderr
     assert ("planner --payload none flies as spatial-tdma where robots move" in said) == is_told
+
+
+@pytest.mark.parametrize(("robots", "is_said"), [(6, True), (7, False)])
+@pytest.mark.parametrize("command", ["fly --no-record", "evaluate --episodes 2"])
+def test_a_planner_of_few_robots_is_said_to_fly_as_tdma(capsys, here, command, robots, is_said):
+    small = ("--windows", "5", "--range-ratio", "2", "--robots", str(robots))
+    assert main([*command.split(), *small, "--policy", "planner"]) == 0
+    assert files(here) == []
+    said = " ".join(capsys.readouterr().err.split())
+    assert (registry.TAKES_TURNS in said) == is_said
 
 
 def test_the_planner_flies_without_payload_under_a_name_of_its_own():

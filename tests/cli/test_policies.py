@@ -105,6 +105,20 @@ def test_one_policy_is_explained_with_the_way_to_fly_it(capsys, here):
         assert f"not {nobody!r}" in capsys.readouterr().err
 
 
+def test_the_planner_of_few_robots_is_said_to_take_turns(capsys):
+    note = "planner flies as tdma in teams of up to 6 robots"
+    assert note in printed(capsys, "planner", "--robots", "6")
+    assert note not in printed(capsys, "planner", "--robots", "7")
+    assert note not in printed(capsys, "tdma", "--robots", "6")
+
+
+@pytest.mark.parametrize("task", ["flocking", "stationary"])
+def test_what_policies_say_of_themselves_names_no_file(capsys, task):
+    for robots in ("6", "40"):
+        listed = printed(capsys, "--json", "--task", task, "--robots", robots)
+        assert ".py" not in listed
+
+
 OWN = """
 from swarm_mj import BroadcastPolicy
 from swarm_mj.policies import FEW_BYTES, About, Information, Look, Payload

@@ -238,5 +238,5 @@ def test_streams_on_a_full_disk_end_no_work(unheard, tmp_path, numbers, argument
     done = unheard("full", numbers, *arguments)
     assert done.returncode == 1
     told = "swarm-mj: error: not all output was written: No space left on device"
-    assert done.stderr.splitlines() == ([] if "2" in numbers else [told])
+    assert done.stderr.splitlines()[-1:] == ([] if "2" in numbers else [told])  # after notes
     assert files(tmp_path) == left

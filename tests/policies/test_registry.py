@@ -14,16 +14,21 @@ from swarm_mj.policies.planner.policy import Planner
 from swarm_mj.policies.planner.resting import RestingPlanner
 from swarm_mj.policies.random_access import Aloha, InnovationGossip, RandomFlooding
 from swarm_mj.policies.registry import (
+    FLOWN_AS,
     LISTED,
     POLICIES,
+    TAKES_TURNS,
     flown_name,
     is_learned,
     make_policy,
+    note_on,
     with_payload,
 )
 from swarm_mj.policies.sotdma.policy import SelfOrganisedTdma
 from swarm_mj.policies.tdma import SpatialTdma, Tdma
 from swarm_mj.policies.tuning import tuned_probability
+from swarm_mj.simulation.rollout import rollout, summarise
+from swarm_mj.simulation.swarm import Swarm
 from swarm_mj.system.packages import asset
 
 MISSION = paper("flocking", num_robots=8)
@@ -160,3 +165,30 @@ def test_a_schedule_has_no_probability(name):
     assert name == "gnn" or make_policy(name, REST).parameters == {}
     with pytest.raises(ValueError, match=f"{name} takes no transmission probability"):
         make_policy(name, REST, 0.5)
+
+
+@pytest.mark.parametrize(
+    ("name", "task", "num_robots", "note"),
+    [
+        ("planner", "stationary", 6, TAKES_TURNS),
+        ("planner", "flocking", 6, TAKES_TURNS),
+        ("planner", "stationary", 7, ""),
+        ("planner --payload none", "stationary", 6, TAKES_TURNS),
+        ("planner --payload none", "flocking", 6, FLOWN_AS),
+        ("tdma", "flocking", 6, ""),
+        ("mine:Policy", "flocking", 6, ""),
+    ],
+)
+def test_a_policy_that_flies_otherwise_than_by_its_name_has_a_note(name, task, num_robots, note):
+    assert note_on(name, paper(task, num_robots=num_robots)) == note
+
+
+@pytest.mark.parametrize("task", ["stationary", "flocking"])
+def test_the_planner_of_few_robots_flies_as_tdma(task):
+    """As its note says."""
+    mission = paper(task, num_robots=6, range_ratio=0.4, num_windows=30)
+    ages: list[float] = []
+    for name in ("planner", "tdma"):
+        flight = rollout(Swarm(mission, [1]), make_policy(name, mission))
+        ages.append(float(summarise(flight).aoi_mean[0]))
+    assert ages[0] == ages[1]

@@ -83,10 +83,12 @@ WITH_LINKS = About(
 class RestingPlanner(BroadcastPolicy):
     """Robots make one plan when they know where all rest.
 
-    Until then they take turns, as in spatial TDMA. With a payload they learn their links, too, and
-    tell each other who hears of all; while someone does not, turns have a share of the slots
-    (`assent.py`). Teams of up to 6 take turns only, where plans gain little and may fail.
+    Teams of up to 6 take turns only, as in TDMA: plans gain them little, and may fail. Others take
+    turns until they know, as in spatial TDMA. With a payload they learn their links, too, and tell
+    each other who hears of all; while someone does not, turns have a share of the slots.
     """
+
+    # How they tell each other stands in `assent.py`.
 
     about = Listed(
         name=WITHOUT_PAYLOAD,
