@@ -2,6 +2,7 @@
 
 import io
 import sys
+from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
@@ -20,6 +21,12 @@ def test_text_is_shown_as_it_is(capsys, monkeypatch, is_error):
     plain_console(is_error=is_error).print(text)
     printed = capsys.readouterr()
     assert (printed.out, printed.err) == (("", text + "\n") if is_error else (text + "\n", ""))
+
+
+def test_a_written_file_is_named_as_a_shell_reads_it(capsys):
+    terminal.say_written(Path("a b.csv"))
+    terminal.say_written(Path("c.mcap"), "12 kB")
+    assert capsys.readouterr().out == "Wrote 'a b.csv'\nWrote c.mcap: 12 kB\n"
 
 
 def test_more_threads_than_cores_are_told(capsys, monkeypatch):
