@@ -24,6 +24,7 @@ from swarm_mj.api.live import (
 from swarm_mj.cli.mission_options import NAMES, PolicyOptions, mission_flags, one_mission
 from swarm_mj.cli.options import common_output, output_option
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.physics.arenas import notes_on
 from swarm_mj.policies import registry
 from swarm_mj.policies.policy_config import SUFFIX
@@ -53,8 +54,9 @@ class FlyOptions(PolicyOptions):
         "planner",
         f"{NAMES}, a learned policy's directory or file, or module:Name of your own",
         reads=registry.files_of,
+        one_only="fly flies one policy, and `swarm-mj evaluate` compares several",
     )
-    seed: int = common_setting(1, "the same seed is the same mission")
+    seed: int = common_setting(1, "the same seed is the same mission", low=0, high=MAX_SEED)
     mission: Mission = one_mission()
     record: Path | None = common_output(
         None,

@@ -2,8 +2,12 @@
 
 import argparse
 from collections.abc import Callable
+from dataclasses import Field
+from functools import partial
 from pathlib import Path
 from typing import Any
+
+from swarm_mj.system.fields import kind_of, meaning_of, numbers_of
 
 BIT_RATES = {"k": 1e3, "m": 1e6, "g": 1e9}  # the factor of a letter behind a number
 
@@ -25,6 +29,26 @@ def _bit_rate(text: str) -> float | None:
     except ValueError:
         example = "250k, 1M or none"
         raise argparse.ArgumentTypeError(f"name bits per second, {example}, not {text!r}") from None
+
+
+def reader_of(spec: Field[Any]) -> Callable[[str], object]:
+    """Return the function that reads an option's value, by its unit or its kind."""
+    kind: Any = kind_of(spec)
+    unit = meaning_of(spec).unit
+    if unit in CONVERT:
+        return CONVERT[unit]
+    if kind in (int, float):
+        return partial(_number, spec, kind)
+    convert: Any = CONVERT.get(kind, kind)
+    return convert
+
+
+def _number(spec: Field[Any], kind: type[int] | type[float], text: str) -> float:
+    """Return a number; the refusal of a text says which ones are allowed."""
+    try:
+        return kind(text)
+    except ValueError:
+        raise argparse.ArgumentTypeError(f"name {numbers_of(spec)}, not {text!r}") from None
 
 
 # Functions that read a value, by its type or unit; other types read it themselves.

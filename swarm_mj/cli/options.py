@@ -15,7 +15,7 @@ from pathlib import Path
 from types import MappingProxyType
 from typing import Any, NoReturn, TypeVar, get_origin
 
-from swarm_mj.cli.option_values import CONVERT
+from swarm_mj.cli.option_values import reader_of
 from swarm_mj.system.arguments import did_you_mean
 from swarm_mj.system.exit_codes import BAD_INPUT
 from swarm_mj.system.fields import (
@@ -47,6 +47,7 @@ class Parser(argparse.ArgumentParser):
 
     rare: Mapping[argparse.Action, str | None] = MappingProxyType({})  # what `--help-all` says
     sought: Mapping[str, str] = MappingProxyType({})  # flags that exist, by what is typed for them
+    one_only: Mapping[str, str] = MappingProxyType({})  # hints for several values, by their flag
 
     def format_help(self) -> str:
         """Return the help; its last line says how to see the options that it leaves out."""
@@ -69,14 +70,22 @@ class Parser(argparse.ArgumentParser):
                 self.error(f"argument {argument.partition('=')[0]}: expected a value, not '--'")
         parsed, left = self.parse_known_args(arguments)
         if left:
-            flags: list[str] = []
-            for action in self._actions:
-                flags.extend(action.option_strings)
-            typed = left[0].partition("=")[0]
-            meant = self.sought.get(typed)
-            hint = f"; did you mean {meant}?" if meant else did_you_mean(typed, flags)
+            hint = self._hint_at(left[0], arguments)
             self.error(f"unrecognized arguments: {' '.join(left)}{hint}")
         return parsed
+
+    def _hint_at(self, unknown: str, arguments: Sequence[str]) -> str:
+        """Return how a complaint about an argument ends: by what is meant, if that is likely."""
+        before = arguments[: arguments.index(unknown)] if unknown in arguments else ()
+        typed_flags = [each.partition("=")[0] for each in before if each.startswith("-")]
+        if typed_flags and not unknown.startswith("-") and typed_flags[-1] in self.one_only:
+            return f"; {self.one_only[typed_flags[-1]]}"
+        flags: list[str] = []
+        for action in self._actions:
+            flags.extend(action.option_strings)
+        typed = unknown.partition("=")[0]
+        meant = self.sought.get(typed)
+        return f"; did you mean {meant}?" if meant else did_you_mean(typed, flags)
 
     def error(self, message: str) -> NoReturn:
         """Print the complaint and where to read on; exit with 2."""
@@ -169,7 +178,7 @@ def parse_options(kind: type[Any], arguments: Sequence[str], prog: str, summary:
         elif spec.name in given:
             values[spec.name] = given[spec.name]
     options = kind(**values)
-    check(options)
+    check(options, _called)
     return options
 
 
@@ -179,6 +188,12 @@ def flags_of(spec: Field[Any]) -> tuple[str, ...]:
     name = spec.name.removeprefix("num_").removeprefix("is_")
     former = [_flag(each) for each in about.former]
     return (about.flag or _flag(name), *former)
+
+
+def _called(spec: Field[Any]) -> str:
+    """Return what messages call an option: its name in words, or else its flag."""
+    about = meaning_of(spec)
+    return about.label or (spec.name if about.is_positional else flags_of(spec)[0])
 
 
 def _flag(name: str) -> str:
@@ -219,9 +234,15 @@ def _parser_of(kind: type[Any], prog: str, summary: str) -> Parser:
         if heading not in groups:
             groups[heading] = parser.add_argument_group(heading)
         _add(groups[heading], option)
-    parser.sought = {
-        typed: flags_of(option.spec)[0] for option in options for typed in option.about.sought_as
-    }
+    sought: dict[str, str] = {}
+    one_only: dict[str, str] = {}
+    for option in options:
+        flag, *_ = flags_of(option.spec)
+        sought |= dict.fromkeys(option.about.sought_as, flag)
+        if option.about.one_only:
+            one_only[flag] = option.about.one_only
+    parser.sought = sought
+    parser.one_only = one_only
     parser.rare = {action: action.help for action in parser._actions if action.dest in rare}
     for action in parser.rare:
         action.help = argparse.SUPPRESS
@@ -276,7 +297,7 @@ def _add(group: argparse._ActionsContainer, option: Option) -> None:
     if kind is bool:
         group.add_argument(*flags, dest=option.place, action="store_true", **how)
         return
-    how["type"] = about.convert or CONVERT.get(about.unit) or CONVERT.get(kind, kind)
+    how["type"] = about.convert or reader_of(spec)
     how["metavar"] = _metavar(option)
     if about.bare is not None:
         how |= {"nargs": "?", "const": about.bare}

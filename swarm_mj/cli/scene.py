@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from swarm_mj.cli.mission_options import one_mission
 from swarm_mj.mission import Mission
+from swarm_mj.mission.batched_rng import MAX_SEED
 from swarm_mj.policies import registry
 from swarm_mj.replay import view
 from swarm_mj.simulation.components import Components
@@ -35,7 +36,7 @@ class SceneOptions:
     mission: Mission = one_mission()
     scene: str | None = same_as(Components, "scene")
     pilot: str | None = same_as(Components, "pilot")
-    seed: int = setting(1, "of the mission whose start is shown")
+    seed: int = setting(1, "of the mission whose start is shown", low=0, high=MAX_SEED)
     out: Path | None = setting(None, "the file to write", shown=str(FILE))
     force: bool = setting(False, "replace an existing file")
     view: bool = setting(

@@ -90,6 +90,7 @@ class Meaning:
     reads: Callable[[Any], Iterable[Path]] | None = None  # files to read that a value names
     bare: str | None = None  # its value if the flag is typed without one; None: it needs one
     sought_as: tuple[str, ...] = ()  # flags typed for it that are none; a message leads here
+    one_only: str = ""  # what a message says to those who type several values where one is taken
     is_positional: bool = False  # whether the option has no flag
     is_common: bool = False  # whether `--help` shows it, and does not leave it to `--help-all`
 
@@ -123,6 +124,7 @@ class MeaningFields(TypedDict, total=False):
     reads: Callable[[Any], Iterable[Path]] | None
     bare: str | None
     sought_as: tuple[str, ...]
+    one_only: str
     is_positional: bool
     is_common: bool
 
@@ -208,11 +210,19 @@ def former_names(*kinds: type[Any]) -> Mapping[str, str]:
     return MappingProxyType(present)
 
 
-def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
+def own_label(spec: Field[Any]) -> str:
+    """Return what messages call a field: its name in words, or else in Python."""
+    return meaning_of(spec).label or spec.name
+
+
+def check(
+    settings: Any,  # noqa: ANN401 - any dataclass
+    called: Callable[[Field[Any]], str] = own_label,
+) -> None:
     """Raise ValueError unless every field's value is of its kind and in its range or choices.
 
-    The message names the field, what is allowed, and the value. NumPy's numbers, which JSON does
-    not know, become Python's, and whole numbers floats where those are meant.
+    The message names the field as it is `called`, what is allowed, and the value. NumPy's numbers,
+    which JSON does not know, become Python's, and whole numbers floats where those are meant.
     """
     for spec in fields(settings):
         value = getattr(settings, spec.name)
@@ -221,7 +231,7 @@ def check(settings: Any) -> None:  # noqa: ANN401 - any dataclass
         has_many = get_origin(spec.type) is tuple
         given: tuple[Any, ...] = value if has_many and isinstance(value, tuple) else (value,)
         for each in given:
-            check_value(spec, each)
+            check_value(spec, each, called(spec))
         plain = tuple(each.item() if isinstance(each, np.generic) else each for each in given)
         if kind_of(spec) is float:
             plain = tuple(map(float, plain))
@@ -260,6 +270,12 @@ def range_of(spec: Field[Any]) -> str:
     return f"{ends} [{about.unit}]" if about.unit else ends
 
 
+def numbers_of(spec: Field[Any]) -> str:
+    """Return which numbers a field takes, in words: their kind, and their range if there is one."""
+    _, described = KINDS.get(kind_of(spec), (object, ""))
+    return f"{described} from {range_of(spec)}" if meaning_of(spec).has_range else described
+
+
 def as_typed(value: object) -> str:
     """Return a setting's value as it is typed."""
     if isinstance(value, tuple):
@@ -272,17 +288,15 @@ def as_typed(value: object) -> str:
 def check_value(spec: Field[Any], value: object, called: str = "") -> None:
     """Check one value of a field, which may be `called` otherwise where it was given."""
     about = meaning_of(spec)
-    label = called or about.label or spec.name
-    kind, described = KINDS.get(kind_of(spec), (object, ""))
+    label = called or own_label(spec)
+    kind, _ = KINDS.get(kind_of(spec), (object, ""))
     if about.choices:
         check_choice(label, value, about.choices, is_joined=about.is_joined)
     is_bool = isinstance(value, bool)  # Python's True is 1
     is_allowed = isinstance(value, kind) and (not is_bool or kind in (bool, object))
-    limits = ""
     if about.low is not None and about.high is not None:
         is_number = isinstance(value, Real)
         is_allowed &= is_number and about.low <= cast("float", value) <= about.high
-        limits = f" from {range_of(spec)}"
     if not is_allowed:
         shown = repr(value) if isinstance(value, str) else value
-        raise ValueError(f"{label} must be {described}{limits}, not {shown}")
+        raise ValueError(f"{label} must be {numbers_of(spec)}, not {shown}")

@@ -70,7 +70,7 @@ def test_a_name_may_be_typed_with_the_ending_of_a_file(walk, to, out, written):
     ("arguments", "complaint"),
     [
         ("a.rrd", "the following arguments are required: --to"),
-        ("a.rrd --to xls", "to must be one of mcap, ns2, csv, not 'xls'"),
+        ("a.rrd --to xls", "error: --to must be one of mcap, ns2, csv, not 'xls'"),
         ("a.rrd --to mcap --out b.csv", "mcap writes NAME.mcap, not b.csv; leave .csv out"),
         ("a.rrd --to csv --out .", "out must be how the names of files begin, not ."),
         ("b.rrd --to csv", "replay b.rrd cannot be found"),

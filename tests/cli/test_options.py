@@ -21,7 +21,13 @@ class Picnic:
     hours: float | None = setting(None, "how long", low=0.5, high=8.0, shown="until it rains")
     sizes: tuple[int, ...] = setting((1, 2), "of the cakes", low=1, high=3)
     is_vegan: bool = setting(False, "100 % plants")
-    drink: str = setting("tea", "what there is", choices=("tea", "juice"), group="drinks")
+    drink: str = setting(
+        "tea",
+        "what there is",
+        choices=("tea", "juice"),
+        group="drinks",
+        one_only="one drink a picnic",
+    )
     place: Path = setting(help="where", metavar="MEADOW")
     typed: tuple[str, ...] = ()
     note: int = 7  # no help, no option
@@ -47,10 +53,10 @@ def test_every_kind_of_value_is_read():
 @pytest.mark.parametrize(
     ("arguments", "complaint"),
     [
-        ("--cakes 10", "num_cakes must be a whole number from 1 to 9 [cakes], not 10"),
-        ("--hours nan", "hours must be a number from 0.5 to 8, not nan"),
-        ("--sizes 1 4", "sizes must be a whole number from 1 to 3, not 4"),
-        ("--drink wine", "drink must be one of tea, juice, not 'wine'"),
+        ("--cakes 10", "--cakes must be a whole number from 1 to 9 [cakes], not 10"),
+        ("--hours nan", "--hours must be a number from 0.5 to 8, not nan"),
+        ("--sizes 1 4", "--sizes must be a whole number from 1 to 3, not 4"),
+        ("--drink wine", "--drink must be one of tea, juice, not 'wine'"),
     ],
 )
 def test_values_out_of_range_are_refused(arguments, complaint):
@@ -64,7 +70,13 @@ def test_values_out_of_range_are_refused(arguments, complaint):
     [
         ("ann", "the following arguments are required: --place"),
         ("--place p", "the following arguments are required: WHO"),
-        ("ann --place p --cakes many", "argument --cakes: invalid int value: 'many'"),
+        (
+            "ann --place p --cakes many",
+            "argument --cakes: name a whole number from 1 to 9 [cakes], not 'many'",
+        ),
+        ("ann --place p --hours long", "argument --hours: name a number from 0.5 to 8, not 'long'"),
+        ("ann --place p --drink tea juice", "unrecognized arguments: juice; one drink a picnic"),
+        ("ann --place p --vegan juice --fog", "unrecognized arguments: juice --fog"),
         ("ann --place p --fog", "unrecognized arguments: --fog"),
         (
             "ann --place p --cake 3 --drnk tea",

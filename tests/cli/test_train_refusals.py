@@ -16,7 +16,7 @@ REFUSED = {
     "NEW --reward velocity-variance": "choose credit team, or reward aoi",
     "NEW --credit team --reward velocity-variance": "only if the robots flock; add --task flocking",
     "NEW --robots 10 201": "robots must be a whole number from 2 to 200, not 201",
-    "NEW --robots many": "argument --robots: invalid int value: 'many'",
+    "NEW --robots many": "argument --robots: name a whole number",
     "NEW --range-ratio 0.02": "too sparse",
     "NEW --robots 10 --bit-rate 10k": "94 bytes, but a slot holds 62 bytes at 10 kbit/s; choose",
     "NEW --missions 16 --robots 4 5 6": "of the 3 kinds (team sizes by missions), not 16",
