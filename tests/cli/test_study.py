@@ -62,7 +62,8 @@ def test_results_are_byte_for_byte_those_of_the_same_options(succeed, tmp_path):
         "--json",
         "e.json",
     )
-    assert ran.stdout == evaluated.stdout
+    # They differ in the names of the files that were written alone.
+    assert ran.stdout.replace("Wrote run.", "Wrote e.") == evaluated.stdout
     for ending in ("csv", "json"):
         assert (tmp_path / f"run.{ending}").read_bytes() == (tmp_path / f"e.{ending}").read_bytes()
 
