@@ -25,7 +25,6 @@ TUNING = {"training/results/classics-tuning.csv"}  # no result: it says what was
 DEBTS = {
     "training/results/bit-rates.csv",
     "training/results/ceiling.csv",
-    "training/results/channels.csv",
     "training/results/classics.csv",
     "training/results/floor.csv",
     "training/results/impairments.csv",

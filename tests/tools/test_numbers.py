@@ -21,7 +21,8 @@ HISTORY = {RESULTS / "classics-tuning.csv"}
 QUICK = RESULTS / "reproduce" / "quick"
 PRESETS = set(RESULTS.glob("paper-*.csv")) | set(RESULTS.glob("reference-*.csv"))
 OTHERS_FLOWN = {
-    RESULTS / f"{name}.csv" for name in ("benchmark", "city", "elsewhere", "peers", "routes")
+    RESULTS / f"{name}.csv"
+    for name in ("benchmark", "channels", "city", "elsewhere", "peers", "routes")
 }
 RELEASED = PRESETS | OTHERS_FLOWN | set(QUICK.glob("*.csv"))
 # Tables of what older code did not measure or fly, or that are measured apart.
