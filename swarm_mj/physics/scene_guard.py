@@ -59,7 +59,7 @@ HULL = ("type", "size", "pos", "quat", "fromto", "contype", "conaffinity", "marg
 
 
 class Kept(NamedTuple):
-    """What a scene must leave, as it is before or after the scene."""
+    """The parts, numbers and hulls that a scene must leave, as they are before or after it."""
 
     parts: list[str]  # what a message calls each joint and actuator
     motion: dict[str, str]  # their numbers and those of MuJoCo's solver, by what they are of

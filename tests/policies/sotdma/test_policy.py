@@ -194,7 +194,7 @@ def test_a_robot_that_chooses_knows_first_slots_of_all_who_announced_none():
     team = begun(row())
     i = int(ORDER[0])
     team.table.announced[i, 3], team.table.slots[i, 3] = 2, 2
-    expected = team._first.of(i, SILENCE >= 0).copy()
+    expected = team._first_slots.of(i, SILENCE >= 0).copy()
     expected[3] = 2
     team._complete(team.table, i, SILENCE >= 0)
     np.testing.assert_array_equal(team.table.slots[i], expected)
