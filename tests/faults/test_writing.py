@@ -22,7 +22,7 @@ from swarm_mj.simulation.rollout import rollout
 from swarm_mj.simulation.swarm import Swarm
 
 WALK = str(RESULTS / "paper-random-walk.csv")
-SMALL = ("--robots", "5", "--windows", "12", "--range-ratio", "0.5")
+SMALL = ("--robots", "7", "--windows", "12", "--range-ratio", "0.5")
 ENDS_S = 10.0  # the longest that a writer that cannot write may take to say so
 
 

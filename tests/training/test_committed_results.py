@@ -13,8 +13,10 @@ from swarm_mj.mission import Mission
 pytestmark = pytest.mark.slow
 
 FILE = Path(__file__).parents[2] / "training" / "results" / "paper-random-walk.csv"
-CHEAP = ("tdma", "round-robin", "mst", "random-flooding", "spatial-tdma", "planner")
-FLIES_OTHERWISE = {"spatial-tdma"}  # since the rows were made, which the next release makes anew
+CHEAP = (
+    *("tdma", "round-robin", "mst", "random-flooding", "spatial-tdma", "sotdma", "planner"),
+    *("index-csma", "gnn"),
+)
 
 
 def read(path):
@@ -45,15 +47,7 @@ def made(committed, forks, tmp_path_factory):
     return read(folder / "r.csv")
 
 
-def each_cheap():
-    """The cheap policies; rows that no longer hold must be other ones, until they are made anew."""
-    for policy in CHEAP:
-        reason = "it flies otherwise since"
-        marks = [pytest.mark.xfail(reason=reason, strict=True)] * (policy in FLIES_OTHERWISE)
-        yield pytest.param(policy, marks=marks)
-
-
-@pytest.mark.parametrize("policy", each_cheap())
+@pytest.mark.parametrize("policy", CHEAP)
 def test_a_committed_row_is_what_its_command_makes(committed, made, policy):
     row, again = committed[policy], made[policy]
     assert row.keys() <= again.keys()  # columns may have been added since
