@@ -22,9 +22,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from swarm_mj.mission.batched_rng import Started
-from swarm_mj.protocol.checks import checked_decode
 from swarm_mj.protocol.timestamps import SLOT_WINDOWS, merge_timestamps, observe_own
-from swarm_mj.protocol.window import Phase, channel_at, respondents, silence
+from swarm_mj.protocol.window import respondents, silence, transmit
 from swarm_mj.radio.free_space import Channel, FreeSpaceRadio, VaryingChannel
 from swarm_mj.system.compiled import compiled
 
@@ -181,16 +180,12 @@ class _World(NamedTuple):
         """Return who decodes whom in both slots of W windows, each of one of the missions."""
         channel = snapshot_channel(self.channel)
         position_m = self.position_m[mission]
-        now = self.now[mission]
         is_active = None if self.is_active is None else self.is_active[mission]
-        first = channel_at(channel, now + SLOT_WINDOWS, mission)
-        second = channel_at(channel, now + 2 * SLOT_WINDOWS, mission)
-        heard = checked_decode(first, position_m, recipient)
-        silence(heard, is_active)
-        answered = respondents(Phase(recipient=recipient, heard=heard))
-        heard_answer = checked_decode(second, position_m, answered)
-        silence(heard_answer, is_active)
-        return heard, heard_answer
+        t = self.now[mission] + SLOT_WINDOWS
+        request = transmit(position_m, is_active, recipient, channel, t, mission)
+        t = t + SLOT_WINDOWS
+        response = transmit(position_m, is_active, respondents(request), channel, t, mission)
+        return request.heard, response.heard
 
 
 def _decoded_at_once(

@@ -85,7 +85,7 @@ def _play_slot(
     under_way: UnderWay,
 ) -> _Slot:
     """Transmit in the slot that ends at t, and merge what arrives in it."""
-    phase = transmit(states, recipient, channel, t)
+    phase = transmit(states.position_m, states.is_active, recipient, channel, t)
     arrivals = channel.split(phase.heard)
     learned_too_late = arrivals.learned_too_late
     before = copied(buffers) if np.any(learned_too_late) else None

@@ -132,13 +132,13 @@ def window(
     t = now + SLOT_WINDOWS
     observe_self(buffers, states, t)
     record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
-    request = transmit(states, recipient, channel, t)
+    request = transmit(states.position_m, states.is_active, recipient, channel, t)
     merge(buffers, request.heard, entries_sent(buffers, request.recipient))
 
     # Response phase.
     t = t + SLOT_WINDOWS
     observe_self(buffers, states, t)
-    response = transmit(states, respondents(request), channel, t)
+    response = transmit(states.position_m, states.is_active, respondents(request), channel, t)
     merge(buffers, response.heard, entries_sent(buffers, response.recipient))
     return request, response
 
@@ -172,25 +172,35 @@ def broadcast(
     t = now + SLOT_WINDOWS
     observe_self(buffers, states, t)
     record_attempt(buffers, recipient, t, states.is_active, silence_is_attempt=silence_is_attempt)
-    phase = transmit(states, recipient, channel, t)
+    phase = transmit(states.position_m, states.is_active, recipient, channel, t)
     merge(buffers, phase.heard, entries_sent(buffers, phase.recipient))
     return phase
 
 
 def transmit(
-    states: RobotStates,
+    position_m: Float[np.ndarray, "B N D"],
+    is_active: Bool[np.ndarray, "B N"] | None,
     recipient: Int[np.ndarray, "B N"],
     channel: Channel | VaryingChannel,
     t: Float[np.ndarray, "B"],
+    mission: Int[np.ndarray, "B"] | None = None,
 ) -> Phase:
-    """Return what the channel makes of the packets of the slot that ends at t [windows].
+    """Return what the channel makes of the packets of a slot.
 
     Inactive robots are silent, and decode nothing.
+
+    Args:
+        position_m: Where the robots truly are [m].
+        is_active: Robots that have not failed; without it, all transmit.
+        recipient: Whom each robot addresses; itself is silence.
+        channel: Who decodes whom.
+        t: When the slot ends [windows].
+        mission: The mission of each row; without it, row b is of mission b.
     """
     sent_to = recipient.copy()
-    silence(sent_to, states.is_active)
-    heard = checked_decode(channel_at(channel, t), states.position_m, sent_to)
-    silence(heard, states.is_active)
+    silence(sent_to, is_active)
+    heard = checked_decode(channel_at(channel, t, mission), position_m, sent_to)
+    silence(heard, is_active)
     return Phase(recipient=sent_to, heard=heard)
 
 
