@@ -25,16 +25,12 @@ TUNING = {"training/results/classics-tuning.csv"}  # no result: it says what was
 DEBTS = {
     "training/results/bit-rates.csv",
     "training/results/ceiling.csv",
-    "training/results/classics.csv",
     "training/results/floor.csv",
     "training/results/impairments.csv",
     "training/results/large-teams-small.csv",
     "training/results/large-teams.csv",
-    "training/results/lookahead-blocks.csv",
     "training/results/one-reference.csv",
     "training/results/position-noise.csv",
-    "training/results/prior-knowledge.csv",
-    "training/results/tutorial.csv",
 }
 
 

@@ -22,7 +22,18 @@ QUICK = RESULTS / "reproduce" / "quick"
 PRESETS = set(RESULTS.glob("paper-*.csv")) | set(RESULTS.glob("reference-*.csv"))
 OTHERS_FLOWN = {
     RESULTS / f"{name}.csv"
-    for name in ("benchmark", "channels", "city", "elsewhere", "peers", "routes")
+    for name in (
+        "benchmark",
+        "channels",
+        "city",
+        "classics",
+        "elsewhere",
+        "lookahead-blocks",
+        "peers",
+        "prior-knowledge",
+        "routes",
+        "tutorial",
+    )
 }
 RELEASED = PRESETS | OTHERS_FLOWN | set(QUICK.glob("*.csv"))
 # Tables of what older code did not measure or fly, or that are measured apart.
@@ -31,7 +42,6 @@ APART = (
     "bodies",
     "crashes",
     "falls",
-    "lookahead-blocks",
     "one-reference",
 )
 NEWER = (RELEASED, CONVERGING, *({RESULTS / f"{name}.csv"} for name in APART))
