@@ -26,10 +26,8 @@ DEBTS = {
     "training/results/bit-rates.csv",
     "training/results/ceiling.csv",
     "training/results/floor.csv",
-    "training/results/impairments.csv",
     "training/results/large-teams-small.csv",
     "training/results/large-teams.csv",
-    "training/results/one-reference.csv",
     "training/results/position-noise.csv",
 }
 

@@ -28,7 +28,9 @@ OTHERS_FLOWN = {
         "city",
         "classics",
         "elsewhere",
+        "impairments",
         "lookahead-blocks",
+        "one-reference",
         "peers",
         "prior-knowledge",
         "routes",
@@ -42,7 +44,6 @@ APART = (
     "bodies",
     "crashes",
     "falls",
-    "one-reference",
 )
 NEWER = (RELEASED, CONVERGING, *({RESULTS / f"{name}.csv"} for name in APART))
 
