@@ -195,7 +195,9 @@ figures: setup
 	for name in fig2 fig3 fig4 fig5 fig6; do \
 	  $(BIN)/swarm-mj figures \
 	    $$(ls training/results/reproduce/$(BUDGET)/$$name.csv 2>/dev/null) \
-	    $$(test $$name = fig3 || ls training/results/paper-*.csv training/results/reproduce/$(BUDGET)/one.csv) \
+	    $$(test $$name = fig3 -a -e training/results/reproduce/$(BUDGET)/fig3.csv || \
+	      ls training/results/paper-*.csv) \
+	    $$(test $$name = fig3 || ls training/results/reproduce/$(BUDGET)/one.csv 2>/dev/null) \
 	    --figure $$name --policy $(PAPERS) --out assets/figures/paper --force || exit; \
 	done
 	$(BIN)/swarm-mj figures training/results/paper-*.csv \
