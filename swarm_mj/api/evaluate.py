@@ -3,7 +3,7 @@
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Unpack, cast
+from typing import TYPE_CHECKING, Unpack, get_args
 
 from swarm_mj.api.flight_summary import Metrics
 from swarm_mj.api.fly import mission_of, names_of
@@ -18,6 +18,7 @@ from swarm_mj.evaluation.table import results_text
 from swarm_mj.mission import Mission, PresetAndFields
 from swarm_mj.policies.registry import listed
 from swarm_mj.simulation.components import Components
+from swarm_mj.system.arguments import checked_choice
 from swarm_mj.system.fields import check_value
 from swarm_mj.system.needs import check_fits, memory_errors
 from swarm_mj.system.packages import need
@@ -228,8 +229,8 @@ def evaluate(
         networks=names_of(networks),
         components=Components(**components),
     )
-    check_value(EngineOptions.__dataclass_fields__["engine"], engine)
-    options = EngineOptions(jobs=num_jobs, engine=cast("EngineName", engine), address=address)
+    chosen = checked_choice("engine", engine, get_args(EngineName))
+    options = EngineOptions(jobs=num_jobs, engine=chosen, address=address)
     study_engine = options.engine_for(study)
     needs = study_needs(study, options.jobs_here)
     way_out = "choose fewer num_jobs, num_robots, num_windows or num_missions"

@@ -150,9 +150,11 @@ def check_in_use(
 
 def mission_flags(*missions: Mission) -> str:
     """Return the options that make missions, without defaults except for the task."""
+    usual = [_usual_values(each) for each in missions]
     flags: list[str] = []
     for spec in SPECS:
-        if spec.name != "task" and all(_can_be_left_out(spec, each) for each in missions):
+        pairs = zip(missions, usual, strict=True)
+        if spec.name != "task" and all(_can_be_left_out(spec, *pair) for pair in pairs):
             continue
         values = values_of(spec.name, missions)
         flags.append(flags_of(spec)[0])
@@ -161,18 +163,19 @@ def mission_flags(*missions: Mission) -> str:
     return " ".join(flags)
 
 
-def _can_be_left_out(spec: Field[Any], mission: Mission) -> bool:
+def _usual_values(mission: Mission) -> dict[str, Any]:
+    """Return the defaults of a mission's fields; together they need not be a mission."""
+    dependent = usual_of(mission)
+    usual = vars(PRESETS[mission.preset](mission.task)) | {"preset": Mission().preset}
+    return usual | {name: getattr(dependent, name) for name in DEPENDENT}
+
+
+def _can_be_left_out(spec: Field[Any], mission: Mission, usual: Mapping[str, Any]) -> bool:
     """Return whether a mission has a field's default, or the field does not count in it."""
     switch = meaning_of(spec).counts_with
     if switch is not None and not switch.is_on(mission):
         return True  # as one of several missions it may have another value, which alone is refused
-    name = spec.name
-    value = getattr(mission, name)
-    if name == "preset":
-        return value == Mission().preset
-    if name in DEPENDENT:
-        return value == getattr(usual_of(mission), name)
-    return value == getattr(PRESETS[mission.preset](mission.task), name)
+    return getattr(mission, spec.name) == usual[spec.name]
 
 
 def values_of(name: str, missions: Sequence[Mission]) -> tuple[Any, ...]:

@@ -2,7 +2,7 @@
 
 import copy
 from numbers import Integral
-from typing import Any, NamedTuple, Unpack, cast, get_args
+from typing import Any, NamedTuple, Unpack, get_args
 
 import numpy as np
 from gymnasium import spaces
@@ -24,7 +24,7 @@ from swarm_mj.protocol.buffers import NO_PARENT
 from swarm_mj.protocol.packets import check_whole
 from swarm_mj.radio.free_space import OwnChannel
 from swarm_mj.simulation.components import Components
-from swarm_mj.system.arguments import check_choice
+from swarm_mj.system.arguments import checked_choice
 
 
 class RobotTruth(NamedTuple):
@@ -144,8 +144,7 @@ def make_team_batch(
 
 def _checked_reward(reward: str, mission: Mission, controller: Controller | None) -> AgentReward:
     """Return a reward that goes with a mission; raise ValueError for any other."""
-    check_choice("reward", reward, REWARDS)
-    paid = cast("AgentReward", reward)
+    paid = checked_choice("reward", reward, REWARDS)
     if paid == "task-cost" and not isinstance(controller or controller_of(mission), Costed):
         raise ValueError(
             f"reward task-cost needs a task that has a cost, and {mission.task} has none; choose "

@@ -5,7 +5,7 @@ An environment is one robot, or one team. All missions begin and end together.
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any, Unpack, cast
+from typing import Any, Unpack
 
 import numpy as np
 import stable_baselines3
@@ -25,11 +25,11 @@ from swarm_mj.envs.options import (
     robot_spaces,
     team_spaces,
 )
-from swarm_mj.envs.vec_env import AGENTS, Agent, SwarmVecEnv
+from swarm_mj.envs.vec_env import AGENTS, SwarmVecEnv
 from swarm_mj.mission import Mission
 from swarm_mj.policies.policy_config import Activation, MlpConfig, MlpShape
 from swarm_mj.policies.stored import save_weights
-from swarm_mj.system.arguments import check_choice
+from swarm_mj.system.arguments import checked_choice
 from swarm_mj.system.packages import commit, version
 
 __all__ = ["Flown", "HeldOutCallback", "make_vec_env", "save_policy"]
@@ -74,8 +74,7 @@ def make_vec_env(
     Example:
         >>> model = PPO("MultiInputPolicy", make_vec_env("flocking", 4, num_robots=10, seed=1))
     """
-    check_choice("agent", agent, AGENTS)
-    chosen = cast("Agent", agent)
+    chosen = checked_choice("agent", agent, AGENTS)
     for name in {"n_envs", "num_envs"} & options.keys():
         raise TypeError(f"make_vec_env has no {name!r}; did you mean num_missions?")
     if "render_mode" in options:

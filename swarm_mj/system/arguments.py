@@ -5,8 +5,9 @@ from collections.abc import Collection, Iterable, Mapping
 from difflib import get_close_matches
 from functools import partial
 from types import MappingProxyType
-from typing import Any
+from typing import Any, TypeVar, cast
 
+Choice = TypeVar("Choice", bound=str)
 NO_NAMES: Mapping[str, str] = MappingProxyType({})
 
 
@@ -22,6 +23,12 @@ def check_choice(
             joined = ", or several joined by commas" if is_joined else ""
             rule = f"{label} must be one of {', '.join(choices)}{joined}"
             raise ValueError(f"{rule}, not {each!r}{did_you_mean(each, choices)}")
+
+
+def checked_choice(label: str, value: object, choices: Collection[Choice]) -> Choice:
+    """Return a value as one of the choices, for type checkers too; ValueError for any other."""
+    check_choice(label, value, choices)
+    return cast("Choice", value)
 
 
 def did_you_mean(typed: object, known: Iterable[str], former: Mapping[str, str] = NO_NAMES) -> str:
