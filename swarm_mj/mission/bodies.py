@@ -12,6 +12,7 @@ from swarm_mj.system.fields import above_zero, other_than, setting
 LEAST_HEIGHT_M = 0.5  # of robots that fly: below it a set point does not sink
 POINT = "point"  # the paper's robot: a mass without size, heading or height
 ROVER = "rover"  # the robot of the package that stays on the floor
+NEVER_FLY = (POINT, ROVER)
 
 
 class RobotGroup(NamedTuple):
@@ -49,7 +50,7 @@ def can_fly(robot: str) -> bool:
     Args:
         robot: Their kind or kinds, as the field of `Mission`.
     """
-    return any(kind not in (POINT, ROVER) for kind in _kinds(robot))
+    return any(kind not in NEVER_FLY for kind in _kinds(robot))
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -74,7 +75,7 @@ class Bodies(Team):
         low=LEAST_HEIGHT_M,
         high=1000.0,
         source=NEW,
-        counts_with=other_than(robot, POINT, ROVER, parts=_kinds),
+        counts_with=other_than(robot, *NEVER_FLY, parts=_kinds),
     )
     height_range_m: float = setting(
         0.0,
@@ -84,7 +85,7 @@ class Bodies(Team):
         low=0.0,
         high=1000.0,
         source=NEW,
-        counts_with=other_than(robot, POINT, ROVER, parts=_kinds),
+        counts_with=other_than(robot, *NEVER_FLY, parts=_kinds),
     )
     robot_spread: float = setting(
         0.0,

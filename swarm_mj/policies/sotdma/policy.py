@@ -130,9 +130,8 @@ class SotdmaTeam:
         self._reads_packets = reads_packets
         self._law = belief.law_over_noise(len(order))
         self._rule = Rule(belief.radio.threshold, frame_slots(len(order)))
-        self._frames_begin: int | None = (
-            None  # of the first frame, known from the first decision on
-        )
+        # The slot in which the first frame begins, known from the first decision on.
+        self._frames_begin: int | None = None
         self.table: SlotTable | None = None  # there is none before the first frame
         self._first_slots: FirstSlots  # made with the table
 
