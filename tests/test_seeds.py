@@ -20,13 +20,6 @@ STUDIES = sorted(ROOT.glob("training/studies/*.toml")) + sorted(ROOT.glob("asset
 RESULTS = sorted((ROOT / "training/results").rglob("*.csv"))
 TUNING = {"training/results/classics-tuning.csv"}  # no result: it says what was chosen
 
-# Results with missions that chose something. No file may join them, and what is mended leaves them.
-# The reason is the same for all: tables are flown anew for version 1.1.0, by other studies.
-DEBTS = {
-    "training/results/large-teams-small.csv",
-    "training/results/large-teams.csv",
-}
-
 
 def chosen(first):
     """The entries that begin with a seed."""
@@ -52,12 +45,12 @@ def chose_something(path):
     return False
 
 
-def test_no_result_has_missions_that_chose_something_but_the_known_debts():
+def test_no_result_has_missions_that_chose_something():
     found = set()
     for path in (*STUDIES, *RESULTS):
         if chose_something(path):
             found.add(str(path.relative_to(ROOT)))
-    assert found - TUNING == DEBTS
+    assert found == TUNING
 
 
 def test_seeds_of_results_are_read():

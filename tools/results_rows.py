@@ -100,6 +100,8 @@ def origin(rows: Sequence[Row], again: str | None = None) -> str:
 
 def study_of(results: str) -> str:
     """Return the name by which `make results` knows what makes a table."""
+    if results == "converging-late":
+        return "converging-courses"
     return "gnn" if results.startswith("reproduce/") else results
 
 

@@ -97,7 +97,11 @@ def _sources(*parts: dict[str, Any]) -> list[str]:
 
 
 def _by_age(spec: dict[str, Any], columns: Sequence[dict[str, Any]], folder: Path) -> list[Any]:
-    """Return a row for each policy found, the lowest mean over the columns first."""
+    """Return a row for each policy found, the lowest mean over the columns first.
+
+    Of a table with results of its own, these have its policies; columns of others may have more.
+    """
+    its_own = {row["policy"] for row in read(_sources(spec), folder)}
     found: Rows = []
     for column in columns:
         rows = read(_sources(spec, column), folder)
@@ -106,6 +110,8 @@ def _by_age(spec: dict[str, Any], columns: Sequence[dict[str, Any]], folder: Pat
         found += select(rows, where)
     ages: dict[str, list[float]] = {}
     for row in found:
+        if its_own and row["policy"] not in its_own:
+            continue
         ages.setdefault(row["policy"], []).append(row[spec.get("order", "aoi_mean")])
     return [{"policy": name} for name in sorted(ages, key=lambda n: sum(ages[n]) / len(ages[n]))]
 
@@ -172,9 +178,7 @@ def _name(row: dict[str, Any], used: Rows) -> str:
     more = any(each.get("payload") not in (None, NO_PAYLOAD) for each in flown)
     policy = str(row["policy"])
     own = f"`{policy}`" if policy.partition(" ")[0] in POLICIES else policy
-    versions = {each.get("version") for each in flown}
-    called = f"{policy} {versions.pop()}" if len(versions) == 1 else policy
-    name = NAMES.get(called, NAMES.get(policy, own))
+    name = NAMES.get(policy, own)
     return f"{name} ({LARGER_PACKETS})" if more else name
 
 

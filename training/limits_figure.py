@@ -36,7 +36,7 @@ SEARCHED, PLANNER = "training.ceiling:Annealed", "planner --payload none"
 FIGURE = RESULT_FIGURES["fig4"]
 METHODS = (
     *("planner", "planner --payload none", "gnn", "spatial-tdma", "tdma", "gossip", "aloha"),
-    *("random-flooding", "sotdma", "age-gain-csma"),
+    *("random-flooding", "sotdma", "index-csma", "age-gain-csma"),
 )
 
 

@@ -1,6 +1,6 @@
 """Every table and figure of the README and the docs, flown from study files at one commit (V).
 
-    python training/results.py                  # make results: three hours on two cores
+    python training/results.py                  # make results: hours on two cores
     python training/results.py --scale smoke    # the same structure, a few windows each: minutes
     python training/results.py --studies paper-random-walk channels
 

@@ -162,16 +162,16 @@ def _crashed(num_robots: int, num_crashed: int) -> str:
 
 
 def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:
-    """Return the task's cost: of flocks, the velocity variance."""
+    """Return the cost of the task, if it has one; that of flocks is the velocity variance."""
     name = summary.task_cost_name
     if name not in (None, Flocking.cost_name):
         return _cost_rows(summary, TASK_COST, name=name, unit=summary.task_cost_unit or "")
-    if not mission.flocks:  # the velocities of walks depend on nothing that is heard
+    if name is None and not mission.flocks:  # no news changes the velocities of a walk
         return {}
     cost = VELOCITY_VARIANCE
     rows = _cost_rows(summary, cost, name=cost.title, unit=cost.unit)
     left = summary.velocity_variance_left
-    if left is not None:
+    if mission.flocks and left is not None:
         share = f"{left:.1%}" if left >= 0.001 else "under 0.1%"
         agreed = summary.agreed_window
         if agreed is None:

@@ -123,6 +123,14 @@ def test_robots_that_nobody_reaches_any_more_have_a_row():
     assert row not in shown("tdma", "flocking", flock)[0]
 
 
+def test_a_walk_has_the_velocity_variance_if_its_controller_counts_it():
+    walk = summary(**BROADCAST)
+    named = replace(walk, task_cost_name="velocity variance", task_cost_unit="m²/s²")
+    row = "velocity variance, mean"
+    assert row not in shown("tdma", "random-walk", walk)[0]
+    assert row in shown("tdma", "random-walk", named)[0]
+
+
 def test_what_is_not_all_is_not_shown_as_all():
     most = summary(packets_sent=675.0, packets_transmitted=675.0, packets_heard=672.0)
     most = replace(most, complete_window=NAN)

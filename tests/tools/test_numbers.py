@@ -17,43 +17,6 @@ CODE = re.compile(r"^( *)```.*?^\1```$", re.MULTILINE | re.DOTALL)
 BY_HAND = re.compile(r"±|\bcommit `?[0-9a-f]{7,}")
 # This shows no result: it chose the constants of a policy.
 HISTORY = {RESULTS / "classics-tuning.csv"}
-# Tables of version 1.1.0: the release flies all others at this commit, too.
-QUICK = RESULTS / "reproduce" / "quick"
-PRESETS = set(RESULTS.glob("paper-*.csv")) | set(RESULTS.glob("reference-*.csv"))
-OTHERS_FLOWN = {
-    RESULTS / f"{name}.csv"
-    for name in (
-        "benchmark",
-        "bit-rates",
-        "ceiling",
-        "channels",
-        "city",
-        "classics",
-        "converging",
-        "converging-courses",
-        "converging-late",
-        "converging-teams",
-        "elsewhere",
-        "exact",
-        "floor",
-        "impairments",
-        "lookahead-blocks",
-        "one-reference",
-        "peers",
-        "position-noise",
-        "prior-knowledge",
-        "routes",
-        "tutorial",
-    )
-}
-RELEASED = PRESETS | OTHERS_FLOWN | set(QUICK.glob("*.csv"))
-# Tables of what older code did not measure or fly, or that are measured apart.
-APART = (
-    "bodies",
-    "crashes",
-    "falls",
-)
-NEWER = (RELEASED, *({RESULTS / f"{name}.csv"} for name in APART))
 
 
 def test_the_pages_have_the_numbers_of_the_results():
@@ -96,16 +59,10 @@ def commits_of(paths):
     return commits
 
 
-def test_all_results_are_of_one_clean_commit_and_each_kind_of_newer_tables_of_another():
-    released = []
-    for path in sorted(RESULTS.rglob("*.csv")):
-        is_apart = HISTORY.union(*NEWER) & {path, *path.parents}
-        if not is_apart:
-            released.append(path)
-    for paths in (released, *map(sorted, NEWER)):
-        commits = commits_of(paths)
-        assert len(commits) == 1, commits
-        assert re.fullmatch("[0-9a-f]{12}", *commits)
+def test_all_results_are_of_one_clean_commit():
+    commits = commits_of({*RESULTS.rglob("*.csv")} - HISTORY)
+    assert len(commits) == 1, commits
+    assert re.fullmatch("[0-9a-f]{12}", *commits)
 
 
 def test_the_tables_can_be_made_from_what_make_results_makes(tmp_path):
