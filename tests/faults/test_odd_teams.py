@@ -88,15 +88,18 @@ BY_DESIGN = {
     "csma": "as aloha: a robot draws when to begin, by a probability tuned for larger teams",
 }
 # Policies in cases, and why.
-IN_PAIRS = "two robots that take turns are 0.1 windows old, and by it less than 1"
 TRUSTS = "it shares slots where it believes that to be harmless; docs/policies.md says so"
-LEARNED = "it was trained without such errors, and sees whose turn it is by spatial-tdma's rule"
+DRAWS = "it has no clock that gives turns: a few robots in reach wait for each other's draws"
+LEVEL = "it counts on the nearest packet being decoded, and here no packet is stronger than another"
 THROUGH = "its tree goes by distances, through walls and shadows, so that some are never reached"
 KNOWN = {
-    ("gnn", "2 at rest"): IN_PAIRS,
-    ("gnn", "2 in long range"): IN_PAIRS,
-    ("gnn", "noise"): LEARNED,
-    ("gnn", "shadowing"): LEARNED,
+    ("gnn", "2 at rest"): DRAWS,
+    ("gnn", "3 at rest"): DRAWS,
+    ("gnn", "2 in long range"): DRAWS,
+    ("gnn", "4 in long range"): DRAWS,
+    ("gnn", "3 walk"): DRAWS,
+    ("gnn", "rooms"): DRAWS,
+    ("gnn", "one_spot"): LEVEL,
     ("mst", "shadowing"): THROUGH,
     ("mst", "blocks"): THROUGH,
     ("spatial-tdma", "rooms"): TRUSTS,
