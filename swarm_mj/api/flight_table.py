@@ -10,6 +10,7 @@ from jaxtyping import Float
 from swarm_mj.api.flight_summary import FlightSummary
 from swarm_mj.control.motion import Flocking
 from swarm_mj.mission import Mission
+from swarm_mj.mission.bodies import POINT
 from swarm_mj.mission.faults import MIN_SURVIVORS
 from swarm_mj.mission.words import bodies_in_words, robots_in_words
 from swarm_mj.policies.about import NO_PAYLOAD
@@ -180,14 +181,19 @@ def _task_costs(mission: Mission, summary: FlightSummary) -> dict[str, str]:
             verdict = f"from window {agreed} on ({agreed * mission.window_s:.2g} s)"
         rows[f"  flock agreed: under {AGREED:.0%} is left"] = verdict
         if summary.decay_rate is not None:
-            fall = 1.0 - math.exp(-summary.decay_rate)
-            law = 1.0 - math.exp(-perfect_rate(mission.window_s))
-            rows["  falls at first by"] = (
-                f"{percent(fall)} a window ({percent(law)} if all knew all)"
-            )
+            rows["  falls at first by"] = _fall(mission, summary.decay_rate)
         if summary.strayed:
             rows["  robots out of everyone's range"] = f"{summary.strayed} at the end"
     return rows
+
+
+def _fall(mission: Mission, decay_rate: float) -> str:
+    """Return how fast the variance falls; of points, beside the law of perfect knowledge."""
+    fall = f"{percent(1.0 - math.exp(-decay_rate))} a window"
+    if mission.robot != POINT:  # bodies follow their set points in their own time
+        return fall
+    law = 1.0 - math.exp(-perfect_rate(mission.window_s))
+    return f"{fall} ({percent(law)} if all knew all)"
 
 
 def _cost_rows(

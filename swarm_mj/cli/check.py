@@ -32,6 +32,9 @@ from swarm_mj.system.terminal import WorkBar, num_cores, plain_console, say_writ
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 MOST_JOBS = 8  # unless asked for: a process takes 0.3 GB, and seconds to start
+WAYS_ON: dict[Verdict, str] = {
+    "not decided": "More missions (--episodes) may decide, or claim another --share.\n"
+}
 CODES: dict[Verdict, int] = {"holds": DONE, "does not hold": REFUTED, "not decided": UNDECIDED}
 
 
@@ -141,6 +144,7 @@ def run(options: CheckOptions) -> int:
     if ending:
         console.print(f"{ending} after {found.num_missions} missions; these are shown.")
         return code
+    console.print(WAYS_ON.get(found.verdict, ""), end="")
     return CODES[found.verdict]
 
 

@@ -290,7 +290,7 @@ def _checked_cost(study: Study, mission: Mission, goal: Goal) -> str:
             return f"under {AGREED:.0%} of the first velocity variance"
         what = f"{cost.name} [{cost.unit}]" if cost else "no cost"
         way_out = "say below which number of it" if cost else "check flocking, or name a controller"
-        raise ValueError(f"this task has {what}, so nothing says when it converged; {way_out}")
+        raise ValueError(f"{mission.task} has {what}, so nothing says when it converged; {way_out}")
     if cost is None:
         raise ValueError(
             f"below {goal.below:g} is of a task's cost, and {mission.task} has none; name a "

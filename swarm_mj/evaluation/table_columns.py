@@ -6,12 +6,16 @@ what `--wide` shows. A new entry prints another column of `Result`.
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 from swarm_mj.evaluation.results import Result, has_own_cost, is_flock
 from swarm_mj.protocol.mission_costs import AOI, VELOCITY_VARIANCE
 from swarm_mj.system.shares import percent
 
 NONE = "-"  # a cell of what does not exist
+# All samples are on one side of the truth with a probability of 2^(1 - n), so no interval between
+# them holds it in 95 % of cases with fewer.
+FEWEST_FOR_INTERVALS = 6
 VARIANCE_FORM = f".{VELOCITY_VARIANCE.digits}f"
 Text = str | Callable[[Result], str]  # the same of every result, or not
 
@@ -66,6 +70,13 @@ def _difference_in_a_line(result: Result) -> str:
     ends = interval(result.aoi_difference_ci_low, result.aoi_difference_ci_high)
     mean = number(result.aoi_difference_mean)
     return f"{mean} [{ends}]" if ends else mean
+
+
+def _with_note(meaning: str, result: Result) -> str:
+    """Return what a column with intervals means; say where missions are too few for them."""
+    if result.episodes >= FEWEST_FOR_INTERVALS:
+        return meaning
+    return f"{meaning} With under {FEWEST_FOR_INTERVALS} missions, these are too narrow."
 
 
 def _complete(result: Result) -> str:
@@ -153,7 +164,7 @@ BRIEF = (
     Shown(
         heading=lambda result: f"minus {result.baseline}'s [95 %]",
         cell=_difference_in_a_line,
-        meaning="Differences are mission by mission, with 95 % intervals.",
+        meaning=partial(_with_note, "Differences are mission by mission, with 95 % intervals."),
     ),
     Shown(
         heading="task cost ± SEM",
@@ -186,7 +197,7 @@ WIDE = (
             f"{plus_minus(result.aoi_mean, result.aoi_sem)}\n"
             f"{interval(result.aoi_ci_low, result.aoi_ci_high)}"
         ),
-        meaning=f"{AGE_MEANING} standard error and 95 % interval.",
+        meaning=partial(_with_note, f"{AGE_MEANING} standard error and 95 % interval."),
     ),
     Shown(
         heading="median\np95",

@@ -1,6 +1,7 @@
 """Ctrl-C as a wish that work honours at its next whole step; SIGTERM and a hang-up are the same."""
 
 import signal
+import sys
 import threading
 from collections.abc import Callable, Container, Iterator
 from contextlib import contextmanager
@@ -35,10 +36,19 @@ def interruptible() -> Iterator[Callable[[], bool]]:
         _pressed[0] = True
         signal.default_int_handler(number, frame)
 
+    # Python prints what it cannot raise, in a callback or a `__del__`: this is heard all the same.
+    show = sys.unraisablehook
+
+    def show_others(unraised: "sys.UnraisableHookArgs") -> None:
+        if not issubclass(unraised.exc_type, KeyboardInterrupt):
+            show(unraised)
+
+    sys.unraisablehook = show_others
     try:
         with _heard_by(interrupt, in_place_of=(signal.SIG_DFL, signal.default_int_handler)):
             yield lambda: _pressed[0]
     finally:
+        sys.unraisablehook = show
         _pressed[0] = False
 
 

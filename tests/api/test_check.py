@@ -32,7 +32,7 @@ def test_a_claim_fails_a_test_that_asserts_it_and_says_why():
         ({"max_missions": 0}, ValueError, "max_missions must be a whole number from 1 to 100000"),
         ({"num_jobs": 0}, ValueError, "num_jobs must be"),
         ({"polcy": "tdma"}, TypeError, "polcy.*did you mean policy"),
-        ({"task": "random-walk"}, ValueError, "this task has no cost"),
+        ({"task": "random-walk"}, ValueError, "random-walk has no cost"),
     ],
 )
 def test_what_is_wrong_is_said_in_a_line(arguments, kind, message):

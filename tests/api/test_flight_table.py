@@ -33,10 +33,17 @@ def summary(**numbers):
 
 
 def shown(
-    policy_name, task, its, strayed=0, crashed=None, energy_j=(None, None), heard_share=0.254
+    policy_name,
+    task,
+    its,
+    strayed=0,
+    crashed=None,
+    energy_j=(None, None),
+    heard_share=0.254,
+    robot="point",
 ):
     """The table's rows as a mapping, and all its text."""
-    mission = paper(task, num_robots=7)
+    mission = paper(task, num_robots=7, robot=robot)
     policy = make_policy(policy_name, mission)
     numbers = flight_numbers(mission, policy, its)
     ended = {
@@ -121,6 +128,13 @@ def test_robots_that_nobody_reaches_any_more_have_a_row():
     flock = summary(**BROADCAST)
     assert shown("tdma", "flocking", flock, strayed=2)[0][row] == "2 at the end"
     assert row not in shown("tdma", "flocking", flock)[0]
+
+
+def test_only_points_have_the_law_of_perfect_knowledge_beside_them():
+    flock = summary(**BROADCAST | {"decay_rate": 0.1})
+    row = "falls at first by"
+    assert shown("tdma", "flocking", flock)[0][row] == "10% a window (19% if all knew all)"
+    assert shown("tdma", "flocking", flock, robot="quadrotor")[0][row] == "10% a window"
 
 
 def test_a_walk_has_the_velocity_variance_if_its_controller_counts_it():

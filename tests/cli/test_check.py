@@ -42,6 +42,7 @@ def test_the_exit_code_is_the_verdict(swarm_mj, tmp_path, claim, code, verdict):
     done = swarm_mj("check", "flocking", *SMALL, *claim, "--json", "a.json", "--plot", "a.svg")
     assert done.returncode == code, done.stderr
     assert f"verdict:    {verdict}\n" in done.stdout
+    assert ("More missions (--episodes) may decide" in done.stderr) == (verdict == "not decided")
     assert done.stdout.endswith("Wrote a.json\nWrote a.svg\n")
     told = json.loads((tmp_path / "a.json").read_text())
     assert told["verdict"] == verdict
@@ -94,7 +95,7 @@ def test_what_is_wrong_is_refused_before_the_flight(refusal, line, message):
 
 @pytest.mark.parametrize("name", ["random-walk", "stationary"])
 def test_tasks_without_a_cost_are_refused(refusal, name):
-    assert "this task has no cost" in refusal("check", name, *SMALL)
+    assert f"{name} has no cost" in refusal("check", name, *SMALL)
 
 
 @pytest.mark.parametrize(

@@ -137,7 +137,7 @@ def test_a_time_that_is_a_whole_number_of_windows_is_in_time():
     ("mission", "goal", "components", "message"),
     [
         (SHORT, {"within_s": 7.0}, {}, "end at 6 s; fly at least 70 windows"),
-        (paper("random-walk"), {}, {}, "this task has no cost, .* check flocking"),
+        (paper("random-walk"), {}, {}, "random-walk has no cost, .* check flocking"),
         (paper("stationary"), {"below": 9.0}, {}, "and stationary has none"),
         (SHORT, {"within_s": 1.0}, {"controller": Rest(SHORT)}, r"mean speed \[m/s\], .* below"),
         (

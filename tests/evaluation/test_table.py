@@ -132,6 +132,13 @@ def test_only_columns_that_are_shown_are_explained(printed):
     assert "Agreed: flocks" in flocks
 
 
+@pytest.mark.parametrize("is_wide", [False, True])
+@pytest.mark.parametrize(("episodes", "is_few"), [(5, True), (6, False)])
+def test_missions_too_few_for_intervals_are_named(printed, episodes, is_few, is_wide):
+    lines = printed([some_result("a", 3.0, episodes=episodes)], 200, is_wide=is_wide)
+    assert ("are too narrow" in " ".join(" ".join(lines).split())) == is_few
+
+
 def test_titles_of_teams_at_rest_say_how_they_move_only_if_that_was_asked_for(printed):
     at_rest = {"task": "stationary", "velocity_ratio": 0.15, "boundary": "reflect"}
     moving = at_rest | {"task": "random-walk"}

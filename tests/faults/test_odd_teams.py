@@ -90,6 +90,7 @@ BY_DESIGN = {
 # Policies in cases, and why.
 TRUSTS = "it shares slots where it believes that to be harmless; docs/policies.md says so"
 DRAWS = "it has no clock that gives turns: a few robots in reach wait for each other's draws"
+SHADOWED = "it was trained in free space, where those nearby decode what it says"
 LEVEL = "it counts on the nearest packet being decoded, and here no packet is stronger than another"
 THROUGH = "its tree goes by distances, through walls and shadows, so that some are never reached"
 KNOWN = {
@@ -99,6 +100,7 @@ KNOWN = {
     ("gnn", "4 in long range"): DRAWS,
     ("gnn", "3 walk"): DRAWS,
     ("gnn", "rooms"): DRAWS,
+    ("gnn", "shadowing"): SHADOWED,
     ("gnn", "one_spot"): LEVEL,
     ("mst", "shadowing"): THROUGH,
     ("mst", "blocks"): THROUGH,

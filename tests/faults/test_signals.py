@@ -162,6 +162,7 @@ def test_a_hang_up_that_a_module_swallows_while_it_loads_ends_the_command(forks,
     was = files(tmp_path)
     done = forks.run(tmp_path, script, module, *command)
     assert done.returncode == 130, done.stderr
+    assert "Traceback" not in done.stderr
     assert "means over missions" not in done.stdout
     assert files(tmp_path) == was
 

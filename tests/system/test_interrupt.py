@@ -1,6 +1,7 @@
 """Ctrl-C noted first, obeyed at once the second time, and as ever afterwards."""
 
 import signal
+import sys
 import threading
 from contextlib import suppress
 
@@ -90,6 +91,22 @@ def test_a_handler_that_is_not_python_s_stays(monkeypatch):
     with interruptible(), deferred_interrupt():
         pass
     assert replaced == []
+
+
+@pytest.mark.parametrize("error", [KeyboardInterrupt, ValueError])
+def test_only_an_interrupt_that_cannot_be_raised_is_not_printed(monkeypatch, error):
+    shown = []
+    monkeypatch.setattr(sys, "unraisablehook", lambda unraised: shown.append(unraised.exc_type))
+
+    class Fails:
+        def __del__(self):
+            raise error
+
+    with interruptible():
+        Fails()
+    assert shown == ([] if error is KeyboardInterrupt else [error])
+    Fails()
+    assert shown[-1] is error
 
 
 def test_an_interrupt_that_a_library_swallowed_is_not_lost():
