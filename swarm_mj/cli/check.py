@@ -32,9 +32,6 @@ from swarm_mj.system.terminal import WorkBar, num_cores, plain_console, say_writ
 from swarm_mj.system.writing import Output, check_outputs, write_json
 
 MOST_JOBS = 8  # unless asked for: a process takes 0.3 GB, and seconds to start
-WAYS_ON: dict[Verdict, str] = {
-    "not decided": "More missions (--episodes) may decide, or claim another --share.\n"
-}
 CODES: dict[Verdict, int] = {"holds": DONE, "does not hold": REFUTED, "not decided": UNDECIDED}
 
 
@@ -136,15 +133,13 @@ def run(options: CheckOptions) -> int:
     if found is None:
         console.print(f"{ending} before the first missions were done.")
         return code
-    (asked,) = study.policies
-    note = registry.note_on(asked, options.mission)
-    if note:
-        console.print(note)
+    _say_note(study, options.mission, console)
     _report(options, found)
     if ending:
         console.print(f"{ending} after {found.num_missions} missions; these are shown.")
         return code
-    console.print(WAYS_ON.get(found.verdict, ""), end="")
+    if found.verdict == "not decided":
+        console.print("More missions (--episodes) may decide, or claim another --share.")
     return CODES[found.verdict]
 
 
@@ -157,6 +152,14 @@ def _report(options: CheckOptions, found: Convergence) -> None:
             say_written(options.json)
         if options.plot:
             _write_chart(options.plot, found)
+
+
+def _say_note(study: Study, mission: Mission, console: Console) -> None:
+    """Say how the policy flies these missions, if not as itself."""
+    (asked,) = study.policies
+    note = registry.note_on(asked, mission)
+    if note:
+        console.print(note)
 
 
 def _so_far(found: Convergence) -> str:
